@@ -1,0 +1,5 @@
+"""The command line: one file per command, nothing but arguments and printing."""
+
+from .app import main
+
+__all__ = ["main"]

@@ -1,0 +1,51 @@
+"""What several commands share: poses on the command line, units in print, and a word when something takes long."""
+
+import json
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+
+from ..errors import InputError
+
+
+def numbers(text: str | None, count: int, option: str) -> list[float] | None:
+    """A list such as "60,20,135" from the command line."""
+    if text is None:
+        return None
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise InputError(f"{option} takes {count} numbers separated by commas", value=text)
+    return values
+
+
+def pose_text(pose: Any) -> str:
+    """A pose in mm and degrees."""
+    return f"({1000 * pose[0]:.2f} mm, {1000 * pose[1]:.2f} mm, {math.degrees(pose[2]):.2f}°)"
+
+
+def cost_text(cost: float, kind: str) -> str:
+    """A cost in its unit."""
+    return f"{cost:.2f} s" if kind == "time" else f"{1000 * cost:.1f} mm"
+
+
+def print_json(value: Any) -> None:
+    typer.echo(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def telling(what: str, after: float = 1.0) -> Iterator[None]:
+    """Says on standard error what is being done, if it takes longer than a second."""
+    timer = threading.Timer(after, lambda: typer.echo(f"{what} …", err=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

@@ -1,0 +1,107 @@
+"""flatpush describe: the friction of a scene, and what it makes of every push."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .common import print_json, telling
+
+
+def command(
+    scene: Annotated[Path, typer.Argument(help="Scene document, YAML or JSON.")],
+    figure: Annotated[Path | None, typer.Option(help="Draw cones and turning centres: .svg or .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> int:
+    """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
+    from ..documents import check_writable, load_scene
+    from ..planning import describe
+    from ..planning.describe import turning_radii
+
+    asked = load_scene(scene)
+    if figure is not None:
+        check_writable(figure)
+    with telling("describing"):
+        pushes = describe(asked)
+    if figure is not None:
+        from ..view.sketches import sketches
+        from ..view import describe_figure
+
+        describe_figure(asked, sketches(asked, pushes), figure)
+    data = {
+        "object": asked.object.name,
+        "friction": asked.object.friction,
+        "centre_of_friction": [float(x) for x in asked.object.cof],
+        "second_moments": [[float(x) for x in row] for row in asked.object.support.covariance],
+        "pushes": [_push(p, turning_radii(p)) for p in pushes],
+    }
+    if as_json:
+        print_json(data)
+        return 0
+    _tell(data)
+    if figure is not None:
+        typer.echo(f"wrote {figure}")
+    return 0
+
+
+def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
+    car = described.option.car
+    found: dict[str, Any] = {
+        "name": described.push.name,
+        "at": [float(x) for x in described.push.at.point],
+        "normal": [float(x) for x in described.push.at.normal],
+        "refusal": described.option.refusal or None,
+        "radii": {key: None if math.isnan(r) else r for key, r in radii.items()},
+        "refusals": {key: car for key, car in described.cars.items() if isinstance(car, str)},
+    }
+    if car is not None:
+        u_left, u_right = car.contact.motion_cone(car.surface)
+        angles = car.contact.force_angles([u_left, u_right])
+        found |= {
+            "cone_degrees": [math.degrees(float(a)) for a in car.contact.force_angles(car.forces[[0, 2]])],
+            "motion_cone_degrees": [math.degrees(float(a)) for a in angles],
+            "flat_point": [float(x) for x in car.flat_point],
+            "left_centre": [float(x) for x in car.left_centre],
+            "right_centre": [float(x) for x in car.right_centre],
+            "straight": [float(x) for x in car.direction],
+            "divergence_length": described.divergence,
+        }
+    return found
+
+
+def _tell(data: dict[str, Any]) -> None:
+    mm = 1000.0
+    cof, moments = data["centre_of_friction"], data["second_moments"]
+    typer.echo(f"{data['object']}: friction between finger and object μ = {data['friction']}")
+    typer.echo(f"centre of friction ({mm * cof[0]:.2f}, {mm * cof[1]:.2f}) mm in the frame of the drawing")
+    typer.echo(
+        f"second moments of the pressure xx {mm * mm * moments[0][0]:.1f}, yy {mm * mm * moments[1][1]:.1f},"
+        f" xy {mm * mm * moments[0][1]:.1f} mm²"
+    )
+    for push in data["pushes"]:
+        at = push["at"]
+        typer.echo(f"\npush {push['name']} at ({mm * at[0]:.2f}, {mm * at[1]:.2f}) mm")
+        if push["refusal"]:
+            typer.echo(f"  cannot steer: {push['refusal']}")
+        else:
+            z, c = push["flat_point"], push["cone_degrees"]
+            typer.echo(
+                f"  friction cone {c[1]:+.1f}° to {c[0]:+.1f}°, motion cone {push['motion_cone_degrees'][1]:+.1f}°"
+                f" to {push['motion_cone_degrees'][0]:+.1f}° about the inward normal (+ is left)"
+            )
+            left, right = push["left_centre"], push["right_centre"]
+            typer.echo(
+                f"  turns left about ({mm * left[0]:.1f}, {mm * left[1]:.1f}) mm,"
+                f" right about ({mm * right[0]:.1f}, {mm * right[1]:.1f}) mm;"
+                f" flat point ({mm * z[0]:.1f}, {mm * z[1]:.1f}) mm"
+            )
+            typer.echo(f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm")
+        radii = {k: ("—" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
+        typer.echo("  turning radius [mm]: " + ", ".join(f"{k} {r}" for k, r in radii.items()))
+        known = [r for r in push["radii"].values() if r is not None]
+        if known and max(known) > 1.5 * min(known):
+            typer.echo(
+                f"  the radius depends on the assumption by a factor of {max(known) / min(known):.1f}:"
+                " measure where the object presses on the table, or take a margin"
+            )

@@ -1,0 +1,111 @@
+"""flatpush plan: plans, verifies, writes."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .common import cost_text, numbers, pose_text, print_json, telling
+
+
+def command(
+    scene: Annotated[Path, typer.Argument(help="Scene document, YAML or JSON.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write the plan here (JSON).")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Draw it: .svg, .png, .gif or .html.")] = None,
+    start: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
+    goal: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
+    model: Annotated[str | None, typer.Option(help="exact, ellipsoid, local or quartic.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the anytime search.")] = None,
+    iterations: Annotated[int | None, typer.Option(help="The anytime search stops here.")] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Seconds; only cuts the search short.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
+) -> int:
+    """Plan a push for SCENE, check the plan, and write it."""
+    from ..documents import check_writable, load_scene, plan_document, save_plan
+    from ..planning import plan
+    from ..simulation import verify
+
+    overrides: dict[str, Any] = {
+        "start": numbers(start, 3, "--start"),
+        "goal": numbers(goal, 3, "--goal"),
+        "planning": {
+            key: value
+            for key, value in {
+                "model": model,
+                "seed": seed,
+                "iterations": iterations,
+                "time_limit": time_limit,
+            }.items()
+            if value is not None
+        },
+    }
+    asked = load_scene(scene, {key: value for key, value in overrides.items() if value})
+    for path in (output, figure):
+        if path is not None:
+            check_writable(path)
+    if figure is not None:
+        from ..view import check_figure
+
+        check_figure(figure)
+    with telling("planning"):
+        found = plan(asked)
+    if found.status != "solved":
+        if as_json:
+            print_json(plan_document(found))
+        typer.echo(f"no plan: {found.reason}", err=True)
+        return 3
+    report = verify(found)
+    if not report.ok:
+        for claim in report.failed:
+            typer.echo(f"claim {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True)
+        typer.echo("the plan fails its own verification; nothing was written", err=True)
+        return 4
+    if output is not None:
+        save_plan(found, output)
+    if figure is not None:
+        from ..view import save_figure
+
+        with telling("drawing"):
+            save_figure(found, figure)
+    if as_json:
+        print_json(plan_document(found))
+        return 0
+    _tell(found, output, figure)
+    return 0
+
+
+def _tell(plan: Any, output: Path | None, figure: Path | None) -> None:
+    scene, certificate = plan.scene, plan.certificate
+    typer.echo(f"{scene.object.name}: {pose_text(scene.start)} → {pose_text(scene.goal)}")
+    if not plan.segments:
+        typer.echo("already there: the start is within the goal tolerance, nothing to push")
+    for segment in plan.pushes:
+        arcs = ", ".join(f"{a.turn} {cost_text(a.cost, scene.planning.cost)}" for a in segment.arcs)
+        typer.echo(f"push {segment.push}: {segment.word} ({arcs})")
+    typer.echo(
+        f"cost {cost_text(plan.cost, scene.planning.cost)} ({scene.planning.cost}), {plan.duration:.1f} s,"
+        f" planned in {plan.run['planning_time']:.2f} s with the {scene.planning.model} model"
+    )
+    if plan.segments:
+        typer.echo(
+            f"certificate: goal met within {_goal_text(certificate.goal_error)},"
+            f" friction margin {100 * certificate.friction_margin:.0f} % of μ"
+            f" ({certificate.friction_margin_degrees:.1f}°)"
+            + (
+                f", both contacts keep {100 * certificate.composite_margin:.0f} % of μ in reserve"
+                if certificate.composite_margin is not None
+                else f", a small error grows {certificate.growth:.1f}-fold"
+            )
+            + (f", clearance {1000 * certificate.clearance:.2f} mm" if certificate.clearance is not None else "")
+        )
+    for warning in certificate.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    for path in (output, figure):
+        if path is not None:
+            typer.echo(f"wrote {path}")
+
+
+def _goal_text(error: Any) -> str:
+    import math
+
+    return f"{1000 * math.hypot(error[0], error[1]):.2g} mm and {math.degrees(abs(error[2])):.2g}°"

@@ -1,0 +1,65 @@
+"""Parses and writes files: scenes, plans, shapes, surfaces, exports. Everything inside is SI.
+
+The modules behind these names (pydantic, yaml and the shape readers among them) are imported when first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .atomic import check_writable, write_atomically
+    from .export import export_csv
+    from .plan_file import load_plan, parse_plan, plan_document, save_plan
+    from .reading import read_mapping
+    from .rollout_file import save_rollouts
+    from .scene_reader import load_scene, parse_scene
+    from .scene_writer import scene_document
+    from .schema import plan_schema, scene_schema
+    from .surface_file import load_surface, save_surface
+    from .template import scene_template
+
+__all__ = [
+    "check_writable",
+    "export_csv",
+    "load_plan",
+    "load_scene",
+    "load_surface",
+    "parse_plan",
+    "parse_scene",
+    "plan_document",
+    "plan_schema",
+    "read_mapping",
+    "save_plan",
+    "save_rollouts",
+    "save_surface",
+    "scene_document",
+    "scene_schema",
+    "scene_template",
+    "write_atomically",
+]
+
+_HOME = {
+    "check_writable": "atomic",
+    "export_csv": "export",
+    "load_plan": "plan_file",
+    "load_scene": "scene_reader",
+    "load_surface": "surface_file",
+    "parse_plan": "plan_file",
+    "parse_scene": "scene_reader",
+    "plan_document": "plan_file",
+    "plan_schema": "schema",
+    "read_mapping": "reading",
+    "save_plan": "plan_file",
+    "save_rollouts": "rollout_file",
+    "save_surface": "surface_file",
+    "scene_document": "scene_writer",
+    "scene_schema": "schema",
+    "scene_template": "template",
+    "write_atomically": "atomic",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)

@@ -1,0 +1,95 @@
+"""Reads and writes what a document says of an object's friction with the table: its support and its limit
+surface."""
+
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..errors import InputError
+from ..friction.pressure import Edges, Feet, Round
+from ..friction.support import Support
+from ..friction.surface import LimitSurface
+from ..geometry import Outline
+from ..problem import Object
+from . import scene_model as m
+
+# The form, in SI, in which a support was read. A support keeps its points about their centre, from which
+# those that were written come back only to rounding; with this, a scene that is written and read again stays
+# the same exactly.
+_WRITTEN: "WeakKeyDictionary[Support, dict[str, Any]]" = WeakKeyDictionary()
+
+
+def read_support(form: Any, outline: Outline, per_metre: float) -> Any:
+    """The support of a parsed form; its two words stay words, which Object understands."""
+    if isinstance(form, str):
+        return form
+    if isinstance(form, m.DiscPart):
+        return Support.disc(form.disc / per_metre, np.array(form.centre) / per_metre)
+    if isinstance(form, m.RingPart):
+        return Support.ring(form.ring / per_metre, np.array(form.centre) / per_metre)
+    if isinstance(form, m.FeetPart):
+        table = np.array(form.points)
+        table[:, :2] /= per_metre
+        support = Support.points(table[:, :2], table[:, 2])
+        _WRITTEN[support] = {"points": table.tolist()}
+        return support
+    filled = isinstance(form, m.PadPart)
+    corners = np.array(form.polygon if filled else form.outline, dtype=float) / per_metre
+    support = Support.polygon(corners) if filled else Support.outline(corners)
+    _WRITTEN[support] = {"polygon" if filled else "outline": corners.tolist()}
+    return support
+
+
+def support_form(obj: Object) -> str | dict[str, Any]:
+    """What a scene document says of the support, in SI."""
+    if obj.support_word:
+        return obj.support_word
+    support = obj.support
+    if support in _WRITTEN:
+        return _WRITTEN[support]
+    pressure, centre = support.pressure, support.centre
+    if isinstance(pressure, Feet):
+        places, weights = support.feet
+        return {"points": np.column_stack([places, weights]).tolist()}
+    if isinstance(pressure, Round):
+        form: dict[str, Any] = {"disc" if pressure.filled else "ring": float(pressure.radius)}
+        return form | ({"centre": centre.tolist()} if np.any(centre) else {})
+    if isinstance(pressure, Edges):
+        corners = pressure.vertices + centre
+        if corners.shape == obj.outline.vertices.shape and np.allclose(
+            corners, obj.outline.vertices, rtol=0, atol=1e-12 * obj.outline.size
+        ):
+            return "uniform" if pressure.filled else "outline"
+        return {"polygon" if pressure.filled else "outline": corners.tolist()}
+    raise InputError("a scene document cannot hold this support", key="object.support", value=support)
+
+
+def read_surface(form: Any, folder: Path) -> LimitSurface:
+    """The limit surface of a parsed form."""
+    if isinstance(form, m.SurfaceFilePart):
+        from .surface_file import load_surface
+
+        return load_surface(folder / form.file)
+    if isinstance(form, m.EllipsoidPart):
+        from ..friction.ellipsoid import Ellipsoid
+
+        return Ellipsoid(np.array(form.ellipsoid))
+    from ..friction.quartic import Quartic
+
+    return Quartic(np.array(form.quartic))
+
+
+def surface_form(surface: LimitSurface) -> dict[str, Any]:
+    """What a document says of a limit surface, in SI."""
+    for name, attribute in (("ellipsoid", "matrix"), ("quartic", "coefficients")):
+        values = getattr(surface, attribute, None)
+        if values is not None:
+            return {name: np.asarray(values, dtype=float).tolist()}
+    raise InputError(
+        "a document holds an ellipsoid or a quartic as limit surface",
+        key="object.surface",
+        value=type(surface).__name__,
+        hint="Give an exact surface by its support.",
+    )

@@ -1,0 +1,69 @@
+"""The structure of a plan document, in SI."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from .scene_model import Finite, Part, Text
+
+Time = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Vector2 = Annotated[list[Finite], Field(min_length=2, max_length=2)]
+Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+class ArcPart(Part):
+    """A piece of a push in which the object keeps one body twist."""
+
+    turn: Literal["left", "straight", "right"] = Field(description="left, straight or right.")
+    twist: Vector3 = Field(
+        description="The body twist [vx, vy, ω] in O at O's origin, averaged over the arc."
+    )
+    duration: Time = Field(description="Seconds.")
+    cost: Finite = Field(description="In the unit of the plan's cost.")
+
+
+class PushSegmentPart(Part):
+    """The object pushed at one place."""
+
+    kind: Literal["push"]
+    push: Text = Field(description="The name of the push.")
+    word: str = Field(description="Such as LSR.")
+    arcs: list[ArcPart] = Field(description="The arcs in order.")
+    times: list[Time] = Field(min_length=1, description="Seconds, from 0.")
+    object: list[Vector3] = Field(description="Poses of the object at the times.")
+    pusher: list[Vector3] = Field(description="Poses of the pusher at the times.")
+    fingers: list[Vector2] = Field(min_length=1, max_length=2, description="Fingertip centres in E.")
+
+
+class TransitSegmentPart(Part):
+    """The pusher alone."""
+
+    kind: Literal["transit"]
+    times: list[Time] = Field(min_length=1, description="Seconds, from 0.")
+    pusher: list[Vector3] = Field(description="Poses of the pusher at the times.")
+    height: list[Finite] = Field(description="Heights above the table at the times; 0 is on it.")
+
+
+def _kind(value: Any) -> str:
+    kind = value.get("kind") if isinstance(value, dict) else getattr(value, "kind", None)
+    return "<transit>" if kind == "transit" else "<push>"
+
+
+SegmentForm = Annotated[
+    Annotated[PushSegmentPart, Tag("<push>")] | Annotated[TransitSegmentPart, Tag("<transit>")],
+    Discriminator(_kind),
+]
+
+
+class PlanModel(Part):
+    """A plan: what was asked, and what is answered."""
+
+    flatpush: Literal["plan/1"] = Field(description="The version of this document: plan/1.")
+    status: Literal["solved", "no_plan"] = Field(description="solved or no_plan.")
+    reason: str = Field(default="", description="Why there is no plan, and what to try.")
+    scene: dict[str, Any] = Field(description="The scene as resolved, in SI: a scene document.")
+    cost: Finite | None = Field(description="In the unit of the scene's cost; null without a plan.")
+    duration: Time = Field(description="Seconds.")
+    run: dict[str, Any] = Field(default_factory=dict, description="Version and planning time; not compared.")
+    segments: list[SegmentForm] = Field(description="Pushes and transits in order.")
+    certificate: dict[str, Any] = Field(default_factory=dict, description="What was proved or measured.")

@@ -1,0 +1,251 @@
+"""Reads a YAML or JSON file into plain values, refusing what would be read otherwise than it was meant."""
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+
+MOST_BYTES = 10_000_000
+MOST_LEVELS = 60
+
+# The plain scalars of YAML 1.2: unlike in YAML 1.1, 1e-3 is a number, on and off are words and 010 is ten.
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_INFINITE = re.compile(r"([-+]?)\.(inf|Inf|INF)")
+_WORDS: dict[str, Any] = {
+    "true": True,
+    "True": True,
+    "TRUE": True,
+    "false": False,
+    "False": False,
+    "FALSE": False,
+}
+_WORDS |= dict.fromkeys(("", "~", "null", "Null", "NULL"))
+_WORDS |= dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan"))
+
+
+def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[str, Any]:
+    """The document in a YAML or JSON file, as plain values in the file's own units, not checked further.
+
+    A file named .json is read as JSON, one named .yaml or .yml as YAML; of others, one that begins with a
+    brace is JSON. Numbers and words are those of YAML 1.2.
+
+    Raises:
+        InputError: if the file cannot be read, is empty, binary, cut off or too large, holds a key twice, or
+            uses YAML's aliases or tags.
+    """
+    source = os.fspath(path)
+    text = read_text(path, most)
+    kind = Path(source).suffix.lower()
+    is_json = kind == ".json" or (kind not in (".yaml", ".yml") and text.lstrip().startswith("{"))
+    value = None
+    if text.strip():
+        value = _read_json(text, source) if is_json else _read_yaml(text, source)
+    if value is None:
+        hint = '"flatpush init" writes a scene to start from.'
+        raise InputError("the file is empty", source=source, hint=hint)
+    if not isinstance(value, dict):
+        rule = "a document is a mapping of keys to values"
+        raise InputError(rule, source=source, value=value, hint=_CUT_OFF)
+    return value
+
+
+def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
+    """The text (UTF-8) of a file of at most so many bytes."""
+    source = os.fspath(path)
+    try:
+        with open(path, "rb") as file:
+            content = file.read(most + 1)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        folder = Path(source).parent
+        hint = (
+            "Check its name and your rights." if folder.is_dir() else f"There is no folder {str(folder)!r}."
+        )
+        if isinstance(error, IsADirectoryError):
+            hint = "Name a file inside it."
+        raise InputError(f"the file cannot be read ({reason})", source=source, hint=hint) from error
+    if len(content) > most:
+        raise InputError(
+            f"this kind of document has at most {most // 1_000_000} MB",
+            source=source,
+            hint="Is it the right file?",
+        )
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise InputError(
+            "the file is not text in UTF-8", source=source, hint="It looks binary: is it the right file?"
+        )
+    return text
+
+
+def plain(value: Any, source: str = "", key: str = "", level: int = 0) -> Any:
+    """The value with tuples and NumPy arrays as lists, NumPy scalars as numbers, mappings as dicts."""
+    if level > MOST_LEVELS:
+        raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=key)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(k): plain(v, source, join(key, str(k)), level + 1) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v, source, join(key, i), level + 1) for i, v in enumerate(value)]
+    return value
+
+
+def join(path: str, step: str | int) -> str:
+    """The path of a key inside a path, as in pushes[1].edge."""
+    if isinstance(step, int):
+        return f"{path}[{step}]"
+    return f"{path}.{step}" if path else step
+
+
+_CUT_OFF = "Is it the right file, and is it complete?"
+_TWICE = "Keep one of the two."
+
+
+class _Pairs(list[tuple[str, Any]]):
+    """The pairs of a JSON object, before keys that stand twice are looked for."""
+
+
+def _read_json(text: str, source: str) -> Any:
+    try:
+        value = json.loads(text, object_pairs_hook=_Pairs, parse_int=_whole)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"this is not JSON: line {error.lineno}, column {error.colno}: {error.msg.lower()}",
+            source=source,
+            hint=_CUT_OFF,
+        ) from None
+    except RecursionError:
+        raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source) from None
+    return _unpaired(value, source, "", 0)
+
+
+def _unpaired(value: Any, source: str, path: str, level: int) -> Any:
+    if level > MOST_LEVELS:
+        raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=path)
+    if isinstance(value, _Pairs):
+        result: dict[str, Any] = {}
+        for key, item in value:
+            _refuse_twice(key, result, source, path)
+            result[key] = _unpaired(item, source, join(path, key), level + 1)
+        return result
+    if isinstance(value, list):
+        return [_unpaired(item, source, join(path, i), level + 1) for i, item in enumerate(value)]
+    return value
+
+
+def _read_yaml(text: str, source: str) -> Any:
+    """Builds the values from the parser's events, so that nothing in the file can construct anything else."""
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    root: list[Any] = []
+    holders: list[Any] = [root]  # the open lists and mappings, outermost first
+    steps: list[Any] = [None]  # the pending key of each open mapping; None where a key comes next
+    documents = 0
+    try:
+        for event in yaml.parse(text, Loader=loader):
+            if isinstance(event, yaml.DocumentStartEvent):
+                documents += 1
+                if documents > 1:
+                    raise InputError(
+                        "a file holds one document", source=source, hint="Remove the second ---."
+                    )
+            elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
+                holders.pop()
+                steps.pop()
+            elif isinstance(event, yaml.NodeEvent):
+                path = _path(holders, steps)
+                _refuse_tricks(event, source, path, len(holders))
+                holder = holders[-1]
+                if isinstance(holder, dict) and steps[-1] is None:
+                    if not isinstance(event, yaml.ScalarEvent):
+                        raise InputError(
+                            "a key is a word", source=source, key=path, hint="Quote braces in text."
+                        )
+                    _refuse_twice(event.value, holder, source, path)
+                    steps[-1] = event.value
+                    continue
+                value: Any = [] if isinstance(event, yaml.SequenceStartEvent) else {}
+                if isinstance(event, yaml.ScalarEvent):
+                    value = _scalar(event.value) if event.implicit[0] else event.value
+                if isinstance(holder, dict):
+                    holder[steps[-1]] = value
+                    steps[-1] = None
+                else:
+                    holder.append(value)
+                if not isinstance(event, yaml.ScalarEvent):
+                    holders.append(value)
+                    steps.append(None)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "unreadable characters"
+        raise InputError(f"this is not YAML: {place}{problem}", source=source, hint=_CUT_OFF) from None
+    return root[0] if root else None
+
+
+def _path(holders: list[Any], steps: list[Any]) -> str:
+    """Where the next value goes; for a key, the path of its mapping."""
+    path = ""
+    for holder, step in zip(holders[1:], steps[1:], strict=True):
+        if isinstance(holder, list):
+            # An outer list already holds the value that is open in it.
+            path = join(path, len(holder) - (holder is not holders[-1]))
+        elif step is not None:
+            path = join(path, step)
+        elif holder is not holders[-1]:
+            path = join(path, next(reversed(holder)))
+    return path
+
+
+def _refuse_tricks(event: Any, source: str, path: str, level: int) -> None:
+    import yaml
+
+    if isinstance(event, yaml.AliasEvent):
+        raise InputError(
+            "aliases (*name) are not read",
+            source=source,
+            key=path,
+            value=f"*{event.anchor}",
+            hint="Write it out.",
+        )
+    if event.tag not in (None, "!"):
+        raise InputError(
+            "tags (!name) are not read", source=source, key=path, value=event.tag, hint="Leave it out."
+        )
+    if level > MOST_LEVELS:
+        raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=path[:80])
+
+
+def _refuse_twice(key: str, mapping: Mapping[str, Any], source: str, path: str) -> None:
+    if key in mapping:
+        raise InputError("this key stands twice", source=source, key=join(path, key), value=key, hint=_TWICE)
+
+
+def _scalar(text: str) -> Any:
+    """What a word without quotes means."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.fullmatch(text):
+        return _whole(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if infinite := _INFINITE.fullmatch(text):
+        return float(f"{infinite[1]}inf")
+    return text
+
+
+def _whole(text: str) -> int | float:
+    """A whole number; one of absurd length as the nearest float."""
+    return int(text) if len(text) < 40 else float(text)

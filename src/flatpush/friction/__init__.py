@@ -1,0 +1,25 @@
+"""How the table resists: the wrench of a twist and the twist of a wrench."""
+
+from .ellipsoid import Ellipsoid
+from .exact import Exact
+from .fits import fit_ellipsoid, fit_quartic, fit_surface
+from .local import local_ellipsoid
+from .quartic import Quartic
+from .report import FitReport
+from .support import CollinearSupportWarning, Support
+from .surface import LimitSurface, WrenchSet
+
+__all__ = [
+    "CollinearSupportWarning",
+    "Ellipsoid",
+    "Exact",
+    "FitReport",
+    "LimitSurface",
+    "Quartic",
+    "Support",
+    "WrenchSet",
+    "fit_ellipsoid",
+    "fit_quartic",
+    "fit_surface",
+    "local_ellipsoid",
+]

@@ -1,0 +1,206 @@
+"""The limit surface of a support under Coulomb friction, neither fitted nor sampled."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..geometry.pose import Array
+from .least import least_dissipation
+from .pressure import ON_FOOT, Feet, Pressure
+from .support import ON_LINE, Support
+from .surface import LimitSurface, WrenchSet
+
+# A force that misses a facet by less than this part of the load lies on it: a twist beside the rim would
+# turn about a point so near the foot that its own rounding decides the direction of the foot's force.
+_TIE = 1e-10
+_MAX_STEPS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Exact(LimitSurface):
+    """The support's own limit surface: the body of wrenches whose support function is h(V) = ∫ |v| dN.
+
+    H is its gauge, of degree 1, with friction = load = 1. Feet make facets (a rotation about a foot has many
+    wrenches); collinear feet also make vertices (a wrench that has many twists). Wrenches and twists are
+    about the origin of the support's coordinates; centre the support to have them about the centre of
+    friction.
+
+    >>> Exact(Support.disc(1.0)).twist([0, 2, 0]).tolist()
+    [0.0, 1.0, 0.0]
+    """
+
+    support: Support
+    degree = 1
+
+    def value(self, wrench: ArrayLike) -> Array:
+        """H(F) = max F·V / h(V), shape (...); exact to second order in the error of the twist."""
+        F = _vectors(wrench, "a wrench")
+        if not np.any(F):
+            return np.zeros(F.shape[:-1])
+        zero = ~np.any(F != 0, axis=-1)
+        V = self.twist(np.where(zero[..., None], np.array([1.0, 0.0, 0.0]), F))
+        return np.sum(F * V, axis=-1) / self.support.dissipation(V)
+
+    def twist(self, wrench: ArrayLike) -> Array:
+        """The twist of least dissipation with F·V given, shape (..., 3).
+
+        Scaled to |(v, ℓ ω)| = 1, ℓ the gyration radius. Of a vertex (collinear feet): the rotation about the
+        middle of the gap between two feet, or the translation.
+        """
+        F = _vectors(wrench, "a wrench")
+        c, ell = self.support.centre, self._length
+        flat = F.reshape(-1, 3).copy()
+        if not np.all(np.any(flat != 0, axis=1)):
+            raise InputError("a zero wrench has no twist of its own", value=wrench)
+        flat[:, 2] = (flat[:, 2] - c[0] * flat[:, 1] + c[1] * flat[:, 0]) / ell
+        V = np.array([self._twist(f) for f in flat])
+        return self._about_origin(V).reshape(F.shape)
+
+    def wrench(self, twist: ArrayLike) -> Array:
+        """The Coulomb wrench at friction = load = 1, shape (..., 3); see Support.wrench."""
+        return self.support.wrench(twist)
+
+    def wrench_set(self, twist: ArrayLike) -> WrenchSet:
+        """All wrenches of one twist (3,): a facet where it turns about a foot, within 1e-9 of the radius."""
+        V = _vectors(twist, "a twist")
+        points, weights = self.support.feet
+        if V[2] != 0 and len(points):
+            gaps = np.hypot(V[0] - V[2] * points[:, 1], V[1] + V[2] * points[:, 0])
+            k = int(np.argmin(gaps))
+            if gaps[k] <= ON_FOOT * self.support.radius * abs(V[2]):
+                return WrenchSet(self.wrench(V), points[k], float(weights[k]))
+        return WrenchSet(self.wrench(V), np.zeros(2), 0.0)
+
+    def stick(self, point: ArrayLike, velocity: ArrayLike) -> Array:
+        """The twist V of the body whose point p (2,) is held to the velocity u (2,) by a force through p.
+
+        With k the rotation about p, V = V₀ + ω k, where h is least along that line: k·∇h = 0.
+        """
+        p, u = np.asarray(point, dtype=float), np.asarray(velocity, dtype=float)
+        if p.shape != (2,) or u.shape != (2,) or not (np.isfinite(p).all() and np.isfinite(u).all()):
+            raise InputError("a point and its velocity are two finite numbers each", value=(point, velocity))
+        speed = float(np.hypot(u[0], u[1]))
+        if speed == 0:
+            return np.zeros(3)
+        q = (p - self.support.centre) / self._length
+        return self._about_origin(speed * self._stick(q, u / speed))
+
+    @cached_property
+    def _length(self) -> float:
+        """The gyration radius of the pressure, the unit of length inside."""
+        return float(np.sqrt(np.trace(self.support.covariance)))
+
+    @cached_property
+    def _unit(self) -> Pressure:
+        pressure = self.support.pressure.scaled(1 / self._length)
+        # A solution may lie within the distance at which a foot counts as resting.
+        return replace(pressure, near=1e-15) if isinstance(pressure, Feet) else pressure
+
+    @cached_property
+    def _facets(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Of the feet, in units: points, weights, turns about them, the others' wrenches, dissipations."""
+        assert isinstance(self._unit, Feet)
+        points, weights = self._unit.points, self._unit.weights
+        turns = np.stack([points[:, 1], -points[:, 0], np.ones(len(points))], axis=1)
+        h, W, _ = self._unit.resist(turns)
+        return points, weights, turns, W, h
+
+    @cached_property
+    def _vertices(self) -> tuple[Array, Array]:
+        """Of collinear feet, in units: vertices (n, 3) and their middle twists; their opposites are more."""
+        if not self.support.collinear:
+            return np.empty((0, 3)), np.empty((0, 3))
+        points, weights, _, _, _ = self._facets
+        e = points[int(np.argmax(np.hypot(*points.T)))]
+        e = e / np.hypot(*e)
+        n = np.array([-e[1], e[0]])
+        order = np.argsort(points @ e)
+        x, w = (points @ e)[order], weights[order]
+        wrenches, twists = [[n[0], n[1], 0.0]], [[n[0], n[1], 0.0]]
+        for j in range(1, len(x)):
+            side = np.where(np.arange(len(x)) < j, -w, w)  # rotation between the feet j - 1 and j
+            middle = (x[j - 1] + x[j]) / 2 * e
+            wrenches.append([*(n * side.sum()), float(x @ side)])
+            twists.append([middle[1], -middle[0], 1.0])
+        return np.array(wrenches), np.array(twists)
+
+    def _about_origin(self, V: Array) -> Array:
+        """Twists (..., 3) in units about the centre, to SI about the origin."""
+        out, c = np.array(V), self.support.centre
+        out[..., 2] /= self._length
+        out[..., 0] += c[1] * out[..., 2]
+        out[..., 1] -= c[0] * out[..., 2]
+        return out
+
+    def _twist(self, F: Array) -> Array:
+        F = F / np.sqrt(F @ F)
+        if isinstance(self._unit, Feet):
+            for W, V in zip(*self._vertices, strict=True):
+                away = np.cross(F, W / np.sqrt(W @ W))
+                if away @ away <= ON_LINE**2:
+                    return V * (np.sign(F @ W) / np.sqrt(V @ V))
+            _, weights, turns, wrenches, h = self._facets
+            power = turns @ F
+            with np.errstate(divide="ignore", invalid="ignore"):
+                g = (h / power)[:, None] * F[:2] - wrenches[:, :2]
+                on = np.flatnonzero((power != 0) & (np.hypot(g[:, 0], g[:, 1]) <= weights + _TIE))
+            if len(on):
+                V = turns[on[0]]
+                return V * (np.sign(power[on[0]]) / np.sqrt(V @ V))
+        V = least_dissipation(self._unit, F)
+        return V / np.sqrt(V @ V)
+
+    def _stick(self, p: Array, u: Array) -> Array:
+        k = np.array([p[1], -p[0], 1.0])
+        if isinstance(self._unit, Feet):
+            resting = self._rests(p, u, k)
+            if resting is not None:
+                return resting
+        V0 = np.array([u[0], u[1], 0.0])
+        arm = float(np.sqrt(k @ k))
+        # From the ellipsoid diag(1, 1, 1): a push straight at the centre starts, and stays, at ω = 0.
+        w = float(p[0] * u[1] - p[1] * u[0]) / arm**2
+        low, high, before = -np.inf, np.inf, np.inf
+        for _ in range(_MAX_STEPS):
+            _, W, K = self._unit.resist((V0 + w * k)[None])
+            slope, bend = float(k @ W[0]), float(k @ K[0] @ k)
+            if abs(slope) <= 4e-16 * arm:
+                break
+            low, high = (w, high) if slope < 0 else (low, w)
+            reach = 4 * (abs(w) + 1 / arm)
+            step = -slope / bend if bend > 0 else -np.sign(slope) * reach
+            step = float(np.clip(step, -reach, reach))
+            bracketed = np.isfinite(low) and np.isfinite(high)
+            if bracketed and (not low < w + step < high or abs(slope) > before / 2):
+                step = (low + high) / 2 - w
+            elif abs(slope) <= 1e-8 * arm and abs(step) <= 1e-8 * (abs(w) + 1 / arm):
+                # Newton has converged: the error of this step is of second order.
+                w += step
+                break
+            before = abs(slope)
+            if w + step == w or (bracketed and high - low <= 1e-16 * (abs(w) + 1 / arm)):
+                break
+            w += step
+        return V0 + w * k
+
+    def _rests(self, p: Array, u: Array, k: Array) -> Array | None:
+        """The rotation about a foot, if that foot can supply what is missing to a force through p."""
+        points, weights, turns, wrenches, _ = self._facets
+        arms = p - points
+        lengths = np.hypot(arms[:, 0], arms[:, 1])
+        near = np.flatnonzero((np.abs(arms @ u) <= ON_FOOT * self._unit.radius) & (lengths > ON_LINE))
+        for j in near:
+            w = float(arms[j, 0] * u[1] - arms[j, 1] * u[0]) / lengths[j] ** 2
+            if abs(k @ wrenches[j]) <= weights[j] * lengths[j] + _TIE:
+                return w * turns[j]
+        return None
+
+
+def _vectors(values: ArrayLike, what: str) -> Array:
+    vectors = np.asarray(values, dtype=float)
+    if vectors.shape[-1:] != (3,) or not np.isfinite(vectors).all():
+        raise InputError(f"{what} is three finite numbers", value=values)
+    return vectors

@@ -1,0 +1,201 @@
+"""The outline of an object: a simple polygon or a circle, in the frame it is drawn in."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from .pose import Array, cross, perpendicular
+
+
+@dataclass(frozen=True)
+class OutlinePoint:
+    """A point of an outline.
+
+    Attributes:
+        point: shape (2,) [m].
+        normal: inward unit normal, shape (2,); at a corner, that of the edge it was found on.
+        edge: number of the polygon's edge, from 0; 0 for a circle.
+        along: place on the edge, 0 to 1; for a circle the polar angle / 2π.
+        distance: from the point asked for, positive outside, negative inside [m].
+        corner: whether the point is a corner of the polygon.
+    """
+
+    point: Array
+    normal: Array
+    edge: int
+    along: float
+    distance: float = 0.0
+    corner: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A simple polygon (corners as written, either sense, convex or not) or a circle.
+
+    Build with Outline.polygon or Outline.circle. Edge k runs from corner k to corner k + 1, in the order written.
+
+    >>> square = Outline.polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
+    >>> square.area, square.centroid.tolist(), square.nearest((1.0, -0.5)).normal.tolist()
+    (4.0, [1.0, 1.0], [0.0, 1.0])
+    """
+
+    vertices: Array  # (n, 2); empty for a circle
+    centre: Array  # (2,); of the circle
+    radius: float  # of the circle; 0 for a polygon
+
+    @classmethod
+    def polygon(cls, vertices: ArrayLike) -> "Outline":
+        """A simple polygon from its corners, shape (n, 2) [m]. Repeated corners are dropped.
+
+        Raises:
+            InputError: if it has fewer than three corners, no area, or crosses itself.
+        """
+        points = np.array(vertices, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise InputError("an outline is a list of [x, y] corners", value=vertices)
+        if not np.all(np.isfinite(points)):
+            raise InputError("the corners of an outline are finite numbers", value=vertices)
+        extent = float(np.max(np.ptp(points, axis=0))) if len(points) else 0.0
+        kept = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-9 * extent
+        points = points[kept] if extent > 0 else points[:1]
+        if len(points) < 3:
+            raise InputError("an outline has at least three different corners", value=len(points))
+        from shapely import Polygon
+
+        shape = Polygon(points)
+        if abs(_shoelace(points)) < 1e-9 * extent**2:
+            raise InputError("an outline encloses an area", hint="Its corners lie on one line.")
+        if not shape.is_valid:
+            raise InputError(
+                "an outline does not cross or touch itself", hint="Check the order of its corners."
+            )
+        points.setflags(write=False)
+        return cls(points, np.zeros(2), 0.0)
+
+    @classmethod
+    def circle(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Outline":
+        """A circle of the given radius [m]."""
+        if not (np.isfinite(radius) and radius > 0):
+            raise InputError("the radius of a circle is positive and finite", value=radius)
+        return cls(np.empty((0, 2)), np.array(centre, dtype=float), float(radius))
+
+    @property
+    def is_circle(self) -> bool:
+        return self.radius > 0
+
+    @cached_property
+    def sense(self) -> float:
+        """+1 if the corners run counter-clockwise, -1 if clockwise."""
+        return 1.0 if self.is_circle or _shoelace(self.vertices) > 0 else -1.0
+
+    @cached_property
+    def area(self) -> float:
+        return float(np.pi * self.radius**2) if self.is_circle else abs(_shoelace(self.vertices))
+
+    @cached_property
+    def centroid(self) -> Array:
+        if self.is_circle:
+            return self.centre
+        # About the first corner, so that far-away coordinates do not cancel.
+        origin = self.vertices[0]
+        p = self.vertices - origin
+        q = np.roll(p, -1, axis=0)
+        c = cross(p, q)
+        return origin + ((p + q) * c[:, None]).sum(axis=0) / (3 * c.sum())
+
+    @cached_property
+    def size(self) -> float:
+        """The largest distance between two of its points [m]."""
+        if self.is_circle:
+            return 2 * self.radius
+        return max(self.radius_about(vertex) for vertex in self.vertices)
+
+    @cached_property
+    def edges(self) -> Array:
+        """Starts and ends of the edges, shape (n, 2, 2); empty for a circle."""
+        return np.stack([self.vertices, np.roll(self.vertices, -1, axis=0)], axis=1)
+
+    @cached_property
+    def edge_normals(self) -> Array:
+        """Inward unit normals of the edges, shape (n, 2)."""
+        d = self.edges[:, 1] - self.edges[:, 0]
+        return self.sense * perpendicular(d) / np.linalg.norm(d, axis=1, keepdims=True)
+
+    def radius_about(self, point: ArrayLike) -> float:
+        """The largest distance of the outline from a point [m]."""
+        p = np.asarray(point, dtype=float)
+        if self.is_circle:
+            return float(np.linalg.norm(p - self.centre) + self.radius)
+        return float(np.max(np.linalg.norm(self.vertices - p, axis=1)))
+
+    def at(self, edge: int, along: float) -> OutlinePoint:
+        """The point at a place on an edge (polygon), or at the angle 2π · along (circle)."""
+        if self.is_circle:
+            angle = 2 * np.pi * along
+            out = np.array([np.cos(angle), np.sin(angle)])
+            return OutlinePoint(self.centre + self.radius * out, -out, 0, float(along % 1.0))
+        if not 0 <= edge < len(self.vertices):
+            raise InputError(f"edges count from 0 to {len(self.vertices) - 1}", value=edge)
+        start, end = self.edges[edge]
+        corner = along <= 1e-9 or along >= 1 - 1e-9
+        return OutlinePoint(
+            start + along * (end - start), self.edge_normals[edge], edge, float(along), 0.0, corner
+        )
+
+    def nearest(self, point: ArrayLike) -> OutlinePoint:
+        """The nearest point of the outline; its distance is negative for a point inside."""
+        p = np.asarray(point, dtype=float)
+        if self.is_circle:
+            offset = p - self.centre
+            distance = float(np.hypot(*offset))
+            out = offset / distance if distance > 0 else np.array([1.0, 0.0])
+            along = float(np.arctan2(out[1], out[0]) / (2 * np.pi)) % 1.0
+            return OutlinePoint(
+                self.centre + self.radius * out, -out, 0, along, distance - self.radius, False
+            )
+        start, d = self.edges[:, 0], self.edges[:, 1] - self.edges[:, 0]
+        length2 = np.einsum("ij,ij->i", d, d)
+        along_all = np.clip(np.einsum("ij,ij->i", p - start, d) / length2, 0.0, 1.0)
+        feet = start + along_all[:, None] * d
+        gaps = np.linalg.norm(feet - p, axis=1)
+        edge = int(np.argmin(gaps))
+        along = float(along_all[edge])
+        sign = -1.0 if self.contains(p) else 1.0
+        tolerance = 1e-9 * self.size / np.sqrt(length2[edge])
+        corner = min(along, 1 - along) <= tolerance
+        return OutlinePoint(
+            feet[edge], self.edge_normals[edge], edge, along, sign * float(gaps[edge]), bool(corner)
+        )
+
+    def contains(self, point: ArrayLike) -> bool:
+        """Whether the point lies strictly inside (the outline itself may go either way)."""
+        p = np.asarray(point, dtype=float)
+        if self.is_circle:
+            return bool(np.hypot(*(p - self.centre)) < self.radius)
+        a, b = self.edges[:, 0] - p, self.edges[:, 1] - p
+        upward = (a[:, 1] <= 0) & (b[:, 1] > 0)
+        downward = (a[:, 1] > 0) & (b[:, 1] <= 0)
+        left = cross(a, b)
+        return bool((np.sum(upward & (left > 0)) - np.sum(downward & (left < 0))) != 0)
+
+    def polyline(self, tolerance: float | None = None) -> Array:
+        """Its corners, or those of a polygon around the circle's centre that stays within the tolerance [m]."""
+        if not self.is_circle:
+            return self.vertices
+        sag = 1e-3 * self.radius if tolerance is None else min(tolerance, self.radius)
+        n = max(16, int(np.ceil(np.pi / np.arccos(1 - sag / self.radius))))
+        angles = 2 * np.pi * np.arange(n) / n
+        return self.centre + self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+    def translated(self, offset: ArrayLike) -> "Outline":
+        """The same outline, moved."""
+        d = np.asarray(offset, dtype=float)
+        return Outline(self.vertices + d, self.centre + d if self.is_circle else self.centre, self.radius)
+
+
+def _shoelace(p: Array) -> float:
+    q = p - p[0]
+    return 0.5 * float(np.sum(cross(q, np.roll(q, -1, axis=0))))

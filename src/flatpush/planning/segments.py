@@ -1,0 +1,111 @@
+"""From a word of a car to timed segments: landing, arcs, leaving."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import compose, exp, transform
+from ..geometry.pose import Array
+from ..problem import Arc, Pusher, PushSegment, Scene, TransitSegment
+from ..steering.car import Car
+from .timing import Trapezoid
+
+# Straight interpolation between samples stays within these [m, rad]: half of what the plan document promises.
+SAG, SAG_ANGLE = 2e-5, 4e-4
+TURNS = {"L": "left", "S": "straight", "R": "right"}
+
+
+@dataclass(frozen=True, eq=False)
+class ArcGeometry:
+    """One arc before it is timed: turn, displacement as a body twist, and the fastest fingertip's length and radius."""
+
+    turn: str
+    step: Array
+    tip_length: float
+    tip_radius: float
+    flat_length: float
+
+
+def arcs_of(car: Car, word: str, parameters: Array, fingers: Array) -> list[ArcGeometry]:
+    """The arcs of a word: angles [rad] of turns, lengths [m] of straight motions; arcs of no length are left out."""
+    twists = {"L": car.left, "S": car.straight, "R": car.right}
+    centres = {"L": car.left_centre, "R": car.right_centre}
+    tips = transform(car.pusher, fingers)
+    found = []
+    for letter, value in zip(word, parameters, strict=True):
+        flat = float(value) * (car.radius if letter != "S" else 1.0)
+        if flat <= 1e-12:
+            continue
+        reach = np.inf if letter == "S" else float(np.max(np.linalg.norm(tips - centres[letter], axis=1)))
+        length = float(value) * (1.0 if letter == "S" else reach)
+        found.append(ArcGeometry(TURNS[letter], flat * twists[letter], length, reach, flat))
+    return found
+
+
+def arc_duration(arc: ArcGeometry, pusher: Pusher) -> float:
+    """Time of an arc from rest to rest [s]."""
+    return Trapezoid.along(arc.tip_length, arc.tip_radius, pusher.speed, pusher.acceleration).duration
+
+
+def push_segment(
+    scene: Scene, name: str, car: Car, fingers: Array, arcs: list[ArcGeometry], start: Array
+) -> PushSegment:
+    """The timed push that follows the arcs from a pose X_WO."""
+    pusher, cost = scene.pusher, scene.planning.cost
+    far = scene.object.outline.radius_about((0.0, 0.0))
+    times, poses, made = [np.zeros(1)], [np.asarray(start, dtype=float)[None]], []
+    clock, X = 0.0, np.asarray(start, dtype=float)
+    for arc in arcs:
+        law = Trapezoid.along(arc.tip_length, arc.tip_radius, pusher.speed, pusher.acceleration)
+        turn = abs(float(arc.step[2]))
+        # The farthest point of the object from the turning centre bows and accelerates the most.
+        reach = far + float(np.hypot(*arc.step[:2])) / turn if turn > 0 else far
+        ratio = max(1.0, reach / arc.tip_radius)
+        t, fraction = law.samples(
+            min(np.sqrt(8 * SAG / (pusher.acceleration * ratio)),
+                np.sqrt(8 * SAG_ANGLE * arc.tip_radius / pusher.acceleration)),
+            int(np.ceil(turn / np.sqrt(8 * SAG / reach))) + 1,
+        )  # fmt: skip
+        times.append(clock + t[1:])
+        poses.append(compose(X, exp(fraction[1:, None] * arc.step)))
+        X = compose(X, exp(arc.step))
+        clock += law.duration
+        reach_E = float(np.hypot(*(car.pusher[:2] - _centre(arc.step)))) * turn if turn > 0 else arc.flat_length
+        value = {"flat": arc.flat_length, "pusher": reach_E, "time": law.duration}[cost]
+        made.append(Arc(arc.turn, arc.step / law.duration, law.duration, value))  # type: ignore[arg-type]
+    all_poses = np.concatenate(poses)
+    word = "".join(arc.turn[0].upper() for arc in arcs)
+    return PushSegment(
+        name, word, tuple(made), np.concatenate(times), all_poses, compose(all_poses, car.pusher), fingers
+    )
+
+
+def fingertips(push_fingers: int, spacing: float) -> Array:
+    """Fingertip centres in E, shape (1 or 2, 2)."""
+    return np.zeros((1, 2)) if push_fingers == 1 else np.array([[0.0, spacing / 2], [0.0, -spacing / 2]])
+
+
+def landing(pusher: Pusher, contact_pose: Array, leaving: bool = False) -> TransitSegment:
+    """From above (or from beside, with planar transits) onto the contact, straight along the push direction; or back."""
+    away = compose(contact_pose, [-pusher.approach, 0.0, 0.0])
+    ways = [(away, contact_pose, 0.0, 0.0, pusher.approach)]
+    if pusher.transit == "lift":
+        ways.insert(0, (away, away, pusher.lift, 0.0, pusher.lift))
+    first = ways[0]
+    times, poses, heights = [np.zeros(1)], [first[0][None]], [np.array([first[2]])]
+    clock = 0.0
+    for a, b, high, low, length in ways:
+        law = Trapezoid.along(length, np.inf, pusher.speed, pusher.acceleration)
+        t, f = law.samples(float(np.sqrt(8 * SAG / pusher.acceleration)), 1)
+        times.append(clock + t[1:])
+        poses.append(a + f[1:, None] * (b - a))
+        heights.append(high + f[1:] * (low - high))
+        clock += law.duration
+    t, X, h = np.concatenate(times), np.concatenate(poses), np.concatenate(heights)
+    if leaving:
+        return TransitSegment(t[-1] - t[::-1], X[::-1].copy(), h[::-1].copy())
+    return TransitSegment(t, X, h)
+
+
+def _centre(step: Array) -> Array:
+    return np.array([-step[1], step[0]]) / step[2]

@@ -1,0 +1,82 @@
+"""From a push of a scene to its mechanics: fingertips, contacts and the limit surface of a model, all about the COF."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..contact import Placement, PointContact, place_fingers
+from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, fit_surface, local_ellipsoid
+from ..geometry import OutlinePoint
+from ..geometry.pose import Array
+from .scene import Model, Object, Push, Scene
+
+
+def placement_of(scene: Scene, push: Push) -> Placement:
+    """The fingertips of a push, in O. Raises InputError where they do not fit."""
+    return place_fingers(scene.object.outline, push.at, push.fingers, push.spacing, scene.pusher.tip_radius)
+
+
+def contacts_of(scene: Scene, placement: Placement) -> tuple[PointContact, ...]:
+    """The contacts of the fingertips as they are, in B (O's axes, origin at the COF)."""
+    mu, cof = scene.object.friction, scene.object.cof
+    return tuple(
+        PointContact(point - cof, normal, mu, hook=True)
+        for point, normal in zip(placement.points, placement.normals, strict=True)
+    )
+
+
+def virtual_contact(scene: Scene, placement: Placement) -> PointContact:
+    """The contact that a push is planned with, in B: the fingertip's own, or the virtual middle of two (Sec. 4.2)."""
+    return PointContact(
+        placement.virtual_point - scene.object.cof, placement.virtual_normal, scene.object.friction, hook=True
+    )
+
+
+def contact_at(scene: Scene, at: OutlinePoint) -> PointContact:
+    """The contact of one fingertip at a point of the outline, in B."""
+    return PointContact(at.point - scene.object.cof, at.normal, scene.object.friction, hook=True)
+
+
+def true_surface(thing: Object) -> LimitSurface:
+    """The limit surface that is believed: the known one, else the support's own."""
+    return thing.surface if thing.surface is not None else _exact(thing)
+
+
+def surface_of(thing: Object, model: Model, direction: Array) -> LimitSurface:
+    """The limit surface of a model, about the COF.
+
+    Args:
+        model: exact (the known surface, else the support's own), ellipsoid or quartic (fitted to that one over fixed
+            low-discrepancy twists), local (Eqs. 2-3, corrected) about a straight push.
+        direction: from the contact to the COF, shape (2,); used by the local model.
+    """
+    surface = true_surface(thing)
+    if model == "exact":
+        return surface
+    if model == "local":
+        return local_ellipsoid(surface, direction)
+    if isinstance(surface, Ellipsoid if model == "ellipsoid" else Quartic):
+        return surface
+    return _fitted(thing, model)
+
+
+def local_rho(thing: Object, direction: Array) -> float:
+    """ρ = a/b of the local model about a straight push [m²]; from the support's pressure, nᵀΣn (methods 1.5)."""
+    matrix = local_ellipsoid(true_surface(thing), direction).matrix
+    return float(matrix[0, 0] / matrix[2, 2])
+
+
+def divergence_length(thing: Object, contact: PointContact) -> float:
+    """L = r + ρ/r [m]: a small error of the bearing contact → COF grows e-fold per L of travel of one finger."""
+    r = float(np.hypot(*contact.point))
+    return r + local_rho(thing, -contact.point / r) / r
+
+
+@lru_cache(maxsize=64)
+def _exact(thing: Object) -> LimitSurface:
+    return Exact(thing.support.centred())
+
+
+@lru_cache(maxsize=64)
+def _fitted(thing: Object, model: Model) -> LimitSurface:
+    return fit_surface(true_surface(thing), "ellipsoid" if model == "ellipsoid" else "quartic")

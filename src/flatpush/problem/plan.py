@@ -1,0 +1,148 @@
+"""What is answered: a plan of pushes and transits, and the rollout of one."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..geometry.pose import Array
+from .scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A piece of a push in which the object keeps one body twist.
+
+    Attributes:
+        turn: left (counter-clockwise), straight or right.
+        twist: body twist in O at O's origin, averaged over the arc: exp(duration · twist) is its displacement.
+        duration: [s], with the time law's stops.
+        cost: in the unit of the plan's cost.
+    """
+
+    turn: Literal["left", "straight", "right"]
+    twist: Array
+    duration: float
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class PushSegment:
+    """The object pushed at one place. Samples are dense enough for straight interpolation (0.05 mm, 0.05°).
+
+    Attributes:
+        push: name of the push.
+        word: such as "LSR".
+        arcs: in order; those of no length are left out.
+        times: [s], from 0, shape (n,).
+        object: poses X_WO, shape (n, 3).
+        pusher: poses X_WE, shape (n, 3).
+        fingers: fingertip centres in E, shape (1 or 2, 2).
+    """
+
+    push: str
+    word: str
+    arcs: tuple[Arc, ...]
+    times: Array
+    object: Array
+    pusher: Array
+    fingers: Array
+    kind: Literal["push"] = "push"
+
+
+@dataclass(frozen=True, eq=False)
+class TransitSegment:
+    """The pusher alone: times (n,), poses X_WE (n, 3), heights above the table (n,), 0 being on it."""
+
+    times: Array
+    pusher: Array
+    height: Array
+    kind: Literal["transit"] = "transit"
+
+
+class Certificate(Mapping[str, Any]):
+    """What was proved or measured about a plan; read as certificate["goal_error"] or certificate.goal_error."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values = dict(values)
+
+    def __getitem__(self, key: str) -> Any:
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["_values"][name]
+        except KeyError:
+            raise AttributeError(f"the certificate has no {name!r}") from None
+
+    def __repr__(self) -> str:
+        return f"Certificate({self._values!r})"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A plan; its attributes are the keys of the plan document.
+
+    Attributes:
+        status: "solved" or "no_plan".
+        scene: the scene as resolved: the pushes listed, every default filled in.
+        cost: in the unit of scene.planning.cost; nan without a plan.
+        duration: [s].
+        segments: pushes and transits in order; empty when start and goal are equal.
+        certificate: see simulation.claims.
+        reason: why there is no plan, and what to try.
+        run: version and planning time; not part of what two plans are compared by.
+    """
+
+    status: Literal["solved", "no_plan"]
+    scene: Scene
+    cost: float = float("nan")
+    duration: float = 0.0
+    segments: tuple[PushSegment | TransitSegment, ...] = ()
+    certificate: Certificate = field(default_factory=lambda: Certificate({}))
+    reason: str = ""
+    run: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def pushes(self) -> tuple[PushSegment, ...]:
+        return tuple(s for s in self.segments if isinstance(s, PushSegment))
+
+    def save(self, path: str | Path) -> None:
+        """Writes the plan document (JSON, SI), whole or not at all."""
+        from ..documents import save_plan
+
+        save_plan(self, path)
+
+    def final_pose(self) -> Array:
+        """Where the plan leaves the object, X_WO, shape (3,)."""
+        return self.pushes[-1].object[-1] if self.pushes else np.asarray(self.scene.start, dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """What the simulator saw; attributes as below, times from the start of the plan.
+
+    Attributes:
+        final_pose: X_WO at the end, shape (3,).
+        times: [s], shape (n,).
+        object, pusher: poses X_WO and X_WE, shape (n, 3).
+        modes: contact mode of each sample ("sticking", "sliding_left", …; "rest" in a transit).
+        outcome: "completed", "lost contact", "left the cone" or "passed a corner".
+        seed: of the perturbation; None for the nominal run.
+    """
+
+    final_pose: Array
+    times: Array
+    object: Array
+    pusher: Array
+    modes: tuple[str, ...]
+    outcome: str
+    seed: int | None = None

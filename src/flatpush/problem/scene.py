@@ -1,0 +1,227 @@
+"""What is asked: an object on a table, a pusher, where to push, from where to where."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..friction.surface import LimitSurface
+from ..friction.support import Support
+from ..geometry import Outline, OutlinePoint
+from ..geometry.pose import Array
+
+Model = Literal["exact", "ellipsoid", "local", "quartic"]
+MODELS: tuple[Model, ...] = ("exact", "ellipsoid", "local", "quartic")
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """A rigid object on the table, in the frame O of its drawing.
+
+    Args:
+        outline: an Outline, or the corners of a polygon [m].
+        support: where it presses on the table: "uniform", "outline", or a Support in the frame O.
+        friction: Coulomb coefficient between fingertip and object.
+        surface: a known limit surface about the centre of friction, in SI; it overrides the support's own.
+        name: for people.
+    """
+
+    outline: Outline
+    support: Support = "uniform"  # type: ignore[assignment]  # the two words are replaced below
+    friction: float = 0.3
+    surface: LimitSurface | None = None
+    name: str = "object"
+    support_word: str = field(default="", init=False)  # "uniform" or "outline" where one was given
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.outline, Outline):
+            object.__setattr__(self, "outline", Outline.polygon(self.outline))
+        if isinstance(self.support, str):
+            object.__setattr__(self, "support_word", self.support)
+            object.__setattr__(self, "support", _support(self.outline, self.support))
+        if not (np.isfinite(self.friction) and self.friction >= 0):
+            raise InputError(
+                "friction is a finite number, 0 or more", key="object.friction", value=self.friction
+            )
+
+    @property
+    def cof(self) -> Array:
+        """The centre of friction in O, shape (2,) [m]."""
+        return self.support.centre
+
+
+@dataclass(frozen=True)
+class Pusher:
+    """The fingers and how they may move. Lengths [m], speed [m/s] of the fastest fingertip, acceleration [m/s²]."""
+
+    fingers: int = 1
+    spacing: float = 0.0
+    tip_radius: float = 0.0025
+    speed: float = 0.02
+    acceleration: float = 0.1
+    approach: float = 0.002
+    turns: bool = True
+    transit: Literal["lift", "planar"] = "lift"
+    lift: float = 0.03
+
+    def __post_init__(self) -> None:
+        def need(good: bool, key: str, rule: str, hint: str = "") -> None:
+            if not good:
+                raise InputError(rule, key=f"pusher.{key}", value=getattr(self, key), hint=hint)
+
+        for key in ("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"):
+            need(bool(np.isfinite(getattr(self, key))), key, "a finite number is needed")
+        need(self.fingers in (1, 2), "fingers", "a pusher has 1 or 2 fingers")
+        need(self.tip_radius >= 0, "tip_radius", "a tip radius is 0 or more")
+        need(self.speed > 0, "speed", "a speed is positive")
+        need(self.acceleration > 0, "acceleration", "an acceleration is positive")
+        need(self.approach >= 0, "approach", "the approach distance is 0 or more")
+        need(self.lift > 0, "lift", "the lift height is positive")
+        if self.fingers == 2:
+            need(self.spacing > 0, "spacing", "two fingers need a positive spacing")
+            need(
+                self.spacing >= 2 * self.tip_radius,
+                "spacing",
+                "the fingers overlap",
+                "spacing ≥ 2 tip_radius",
+            )
+            need(self.turns, "turns", "two fingers that cannot turn cannot turn an object", "Use one finger.")
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """One place to push at: a point of the outline and the fingers that push there.
+
+    Attributes:
+        name: for people, and in plans.
+        at: the point of the outline, in O.
+        fingers, spacing: of this push [m].
+    """
+
+    name: str
+    at: OutlinePoint
+    fingers: int = 1
+    spacing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """Where object and pusher must stay: bounds (xmin, ymin, xmax, ymax) and obstacles, simple polygons [m]."""
+
+    bounds: tuple[float, float, float, float] | None = None
+    obstacles: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True)
+class Planning:
+    """How to plan; the defaults are those of the scene document, in SI."""
+
+    model: Model = "exact"
+    two_finger: Literal["cone", "middle"] = "middle"
+    cost: Literal["flat", "pusher", "time"] = "flat"
+    switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
+    friction_margin: float = 0.2
+    clearance: float = 0.0
+    goal_tolerance: tuple[float, float, float] = (0.0005, 0.0005, float(np.deg2rad(0.5)))
+    robust: bool = False
+    seed: int = 0
+    iterations: int = 10000
+    time_limit: float = 5.0
+
+    @property
+    def switching(self) -> float:
+        """The switching cost that applies, in the unit of the cost."""
+        if self.switch_cost is not None:
+            return self.switch_cost
+        return 0.03 if self.cost == "flat" else 0.0
+
+    def __post_init__(self) -> None:
+        def need(good: bool, key: str, rule: str) -> None:
+            if not good:
+                raise InputError(rule, key=f"planning.{key}", value=getattr(self, key))
+
+        need(self.model in MODELS, "model", f"the model is one of {', '.join(MODELS)}")
+        need(
+            0 <= self.friction_margin < 1,
+            "friction_margin",
+            "the friction margin is at least 0 and less than 1",
+        )
+        need(np.isfinite(self.clearance) and self.clearance >= 0, "clearance", "a clearance is 0 or more")
+        need(
+            np.isfinite(self.switching) and self.switching >= 0,
+            "switch_cost",
+            "a switching cost is 0 or more",
+        )
+        need(self.time_limit > 0, "time_limit", "a time limit is positive")
+        need(self.iterations >= 1, "iterations", "there is at least one iteration")
+        need(
+            len(self.goal_tolerance) == 3 and all(t > 0 and np.isfinite(t) for t in self.goal_tolerance),
+            "goal_tolerance",
+            "three positive numbers are needed",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that a plan depends on, in SI.
+
+    Args:
+        object: what is pushed.
+        start, goal: poses (x, y, θ) of the object frame O on the table W [m, rad].
+        pusher: the fingers.
+        pushes: places to push at, or "auto".
+        workspace, planning: as their classes say.
+    """
+
+    object: Object
+    start: ArrayLike
+    goal: ArrayLike = (0.0, 0.0, 0.0)
+    pusher: Pusher = field(default_factory=Pusher)
+    pushes: tuple[Push, ...] | Literal["auto"] = "auto"
+    workspace: Workspace = field(default_factory=Workspace)
+    planning: Planning = field(default_factory=Planning)
+
+    def __post_init__(self) -> None:
+        for name in ("start", "goal"):
+            value = getattr(self, name)
+            pose = np.array(value, dtype=float)
+            if pose.shape != (3,) or not np.all(np.isfinite(pose)):
+                raise InputError("a pose is three finite numbers, [x, y, θ]", key=name, value=value)
+            if abs(pose[2]) > 4 * np.pi:
+                raise InputError(
+                    "an angle of a pose is within two turns (4π rad)",
+                    key=name,
+                    value=value,
+                    hint="It looks like degrees: use np.deg2rad.",
+                )
+            pose.setflags(write=False)
+            object.__setattr__(self, name, pose)
+
+    @property
+    def start_pose(self) -> Array:
+        return np.asarray(self.start, dtype=float)
+
+    @property
+    def goal_pose(self) -> Array:
+        return np.asarray(self.goal, dtype=float)
+
+
+def _support(outline: Outline, word: str) -> Support:
+    if word not in ("uniform", "outline"):
+        raise InputError('the support is "uniform", "outline" or a Support', key="object.support", value=word)
+    if outline.is_circle:
+        disc = Support.disc if word == "uniform" else Support.ring
+        return disc(outline.radius, centre=outline.centre)
+    return (Support.polygon if word == "uniform" else Support.outline)(outline.vertices)
+
+
+def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
+    """The pushes as a tuple, checked for names that stand twice."""
+    names = [push.name for push in pushes]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError("each push has a name of its own", key="pushes", value=name)
+    return tuple(pushes)

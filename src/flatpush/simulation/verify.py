@@ -1,0 +1,115 @@
+"""Recomputes every claim of a plan from its scene."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlatpushError, InputError
+from ..problem import Plan
+from .claims import arc_costs, certify, sample_errors
+
+RELATIVE, ABSOLUTE = 1e-6, 1e-9
+# Samples may round to the plan document's digits, and speeds to the sampling of a smooth profile.
+SAMPLES, SPEED = 1e-9, 1.0 + 1e-6
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of a plan and what came out when it was recomputed.
+
+    Attributes:
+        name: the claim.
+        stated, recomputed: numbers, lists or words; stated is None for what holds without being stated.
+        tolerance: allowed difference, relative or absolute, or the limit that recomputed must keep.
+        ok: whether it holds.
+        rule: in words.
+    """
+
+    name: str
+    stated: Any
+    recomputed: Any
+    tolerance: float
+    ok: bool
+    rule: str = "as stated"
+
+
+@dataclass(frozen=True)
+class Report:
+    """All claims of a plan; ok if every one holds."""
+
+    claims: tuple[Claim, ...]
+
+    @property
+    def ok(self) -> bool:
+        return all(claim.ok for claim in self.claims)
+
+    @property
+    def failed(self) -> tuple[Claim, ...]:
+        return tuple(claim for claim in self.claims if not claim.ok)
+
+
+def verify(plan: Plan) -> Report:
+    """Recomputes every claim of a plan from its scene and checks what every plan must keep.
+
+    Raises:
+        InputError: for a document that holds no plan.
+    """
+    if plan.status != "solved":
+        raise InputError("there is no plan to verify", hint=plan.reason)
+    try:
+        computed = certify(plan.scene, plan.segments)
+        errors = sample_errors(plan.scene, plan.segments)
+    except FlatpushError as error:
+        return Report((Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense"),))
+    claims = [_stated("cost", plan.cost, computed["cost"]), _stated("duration", plan.duration, computed["duration"])]
+    claims += [_stated(key, plan.certificate.get(key), value) for key, value in computed.items()]
+    claims += [
+        _stated(key, value, computed.get(key)) for key, value in plan.certificate.items() if key not in computed
+    ]
+    claims += [
+        _stated(f"word of {s.push}", s.word, "".join(a.turn[0].upper() for a in s.arcs)) for s in plan.pushes
+    ]
+    claims += [_arc_turns(plan), _arc_costs(plan, computed)]
+    goal = np.abs(computed["goal_error"])
+    tolerance = np.array(plan.scene.planning.goal_tolerance)
+    excess = float(np.max(goal / tolerance))
+    claims.append(Claim("reaches the goal", None, excess, 1.0, excess <= 1.0, "within the goal tolerance"))
+    for key in ("friction_margin", "motion_cone_margin_degrees", "curvature_margin"):
+        value = computed[key]
+        if value is not None:
+            claims.append(Claim(f"{key} kept", None, value, 0.0, bool(value >= -ABSOLUTE), "not negative"))
+    clearance = computed["clearance"]
+    if clearance is not None:
+        need = plan.scene.planning.clearance
+        claims.append(Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required"))
+    for key, value in errors.items():
+        limit = SPEED if key == "speed" else SAMPLES
+        claims.append(Claim(f"samples: {key}", None, value, limit, bool(value <= limit), "consistent"))
+    return Report(tuple(claims))
+
+
+def _stated(name: str, stated: Any, recomputed: Any) -> Claim:
+    return Claim(name, stated, recomputed, RELATIVE, _agree(stated, recomputed))
+
+
+def _agree(a: Any, b: Any) -> bool:
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_agree(a[k], b[k]) for k in a)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(_agree(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
+        return bool(abs(a - b) <= max(ABSOLUTE, RELATIVE * max(abs(a), abs(b))))
+    return bool(a == b)
+
+
+def _arc_turns(plan: Plan) -> Claim:
+    names = {1: "left", 0: "straight", -1: "right"}
+    bad = [a.turn for s in plan.pushes for a in s.arcs if names[int(np.sign(a.twist[2]))] != a.turn]
+    return Claim("turns", None, bad, 0.0, not bad, "each arc turns as it is named")
+
+
+def _arc_costs(plan: Plan, computed: dict[str, Any]) -> Claim:
+    stated = [[a.cost for a in s.arcs] for s in plan.pushes]
+    recomputed = [arc_costs(plan.scene, s, computed["cars"][s.push]) for s in plan.pushes]
+    return _stated("arc costs", stated, recomputed)

@@ -1,0 +1,93 @@
+"""Sketches of pushes after [Zhou2017] Figs. 1 and 2: cones, rotation centres, flat point."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..geometry.pose import Array
+
+if TYPE_CHECKING:
+    from ..problem import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class PushSketch:
+    """One push as it is sketched. Everything in the drawing's frame O, lengths [m]; directions of any size.
+
+    Left and right edges of the cones are those seen along the inward normal, so the force at the left edge
+    turns the object clockwise, about right_centre: left_centre belongs to the left, counter-clockwise turn.
+
+    Attributes:
+        name: of the push.
+        contact_points: on the outline, shape (k, 2), one or two.
+        normal: inward, of the (virtual) contact, which is the middle of the contact points; shape (2,).
+        fingertips: centres, shape (k, 2).
+        tip_radius: of a fingertip.
+        friction: Coulomb coefficient, for the caption.
+        cof: centre of friction, shape (2,).
+        force_left, force_right: edges of the friction cone, shape (2,).
+        motion_left, motion_right: edges of the motion cone, shape (2,).
+        left_centre, right_centre: rotation centres of the two extreme turns, shape (2,); nan if refused.
+        flat_point: their midpoint, shape (2,); nan if refused.
+        straight: direction of the motion without turning, shape (2,); nan if refused.
+        refusal: why the push cannot steer; empty if it can.
+        centres: rotation centres between the edges of the cone, in order, shape (n, 2): the curve that stands
+            for the line under a general surface; empty for a line.
+    """
+
+    name: str
+    contact_points: Array
+    normal: Array
+    fingertips: Array
+    tip_radius: float
+    friction: float
+    cof: Array
+    force_left: Array
+    force_right: Array
+    motion_left: Array
+    motion_right: Array
+    left_centre: Array
+    right_centre: Array
+    flat_point: Array
+    straight: Array
+    refusal: str = ""
+    centres: Array = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def steers(self) -> bool:
+        return not self.refusal
+
+    @property
+    def contact(self) -> Array:
+        """The (virtual) contact point: the middle of the contact points, shape (2,)."""
+        return np.mean(np.atleast_2d(self.contact_points), axis=0)
+
+    @property
+    def turning_radius(self) -> float:
+        """Half the distance between the turning centres [m]."""
+        return 0.5 * float(np.linalg.norm(self.left_centre - self.right_centre))
+
+
+def describe_figure(scene: "Scene", descriptions: Sequence[PushSketch], path: str | Path) -> None:
+    """Draws the pushes of a scene into a file, one panel each, whole or not at all.
+
+    Args:
+        scene: whose object is drawn.
+        descriptions: the pushes.
+        path: ends in .svg or .png.
+
+    Raises:
+        InputError: if the ending is another, the file cannot be written, or there is nothing to draw.
+    """
+    from ..documents.atomic import write_atomically
+    from ..errors import InputError
+    from .figure import check_ending
+    from .sketch import draw_sketches
+
+    ending = check_ending(path, (".svg", ".png"))
+    if not descriptions:
+        raise InputError("there is at least one push to describe", source=str(path))
+    write_atomically(path, draw_sketches(scene, tuple(descriptions), ending))

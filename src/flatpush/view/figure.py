@@ -1,0 +1,64 @@
+"""Saves the picture or the animation of a plan; the ending of the file name says which."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..documents.atomic import write_atomically
+from ..errors import InputError
+from ..problem import Plan, Rollout
+
+ENDINGS = (".svg", ".png", ".gif", ".html")
+
+
+def save_figure(plan: Plan, path: str | Path, rollouts: Sequence[Rollout] = ()) -> None:
+    """Draws a plan into a file, whole or not at all.
+
+    Args:
+        plan: solved or not; without a plan the figure shows start, goal and the reason.
+        path: ends in .svg or .png (a picture), .gif (an animation) or .html (one to play with, in one file).
+        rollouts: simulated runs of this plan, drawn over it in red dashes.
+
+    Raises:
+        InputError: if the ending is another, or the file cannot be written.
+    """
+    check_figure(path)
+    ending = Path(path).suffix.lower()
+    if ending == ".gif":
+        from .gif import draw_gif
+
+        content = draw_gif(plan, rollouts)
+    elif ending == ".html":
+        from .page import draw_page
+
+        content = draw_page(plan, rollouts).encode("utf-8")
+    else:
+        from .plan_figure import draw_plan
+
+        content = draw_plan(plan, ending, rollouts)
+    write_atomically(path, content)
+
+
+def check_figure(path: str | Path) -> None:
+    """Refuses a name that save_figure could not write to, so that a long computation need not end with that.
+
+    Raises:
+        InputError: if the ending is none of save_figure's, or the folder does not exist.
+    """
+    check_ending(path, ENDINGS)
+    target = Path(path)
+    if target.is_dir():
+        raise InputError("this is a folder, not a file", source=str(path))
+    if not target.parent.is_dir():
+        raise InputError("the folder of this file does not exist", source=str(path), hint="Create it first.")
+
+
+def check_ending(path: str | Path, endings: tuple[str, ...]) -> str:
+    """The ending of a file name in lower case, if it is one of these."""
+    ending = Path(path).suffix.lower()
+    if ending not in endings:
+        raise InputError(
+            f"the name of a figure ends in {', '.join(endings[:-1])} or {endings[-1]}",
+            source=str(path),
+            value=ending or "no ending",
+        )
+    return ending

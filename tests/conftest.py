@@ -1,0 +1,59 @@
+"""Objects and scenes that several tests use, and where the recorded data are."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def data_folder() -> Path:
+    """The folder of recorded data; tests that need it are skipped where it is absent."""
+    folder = Path(os.environ.get("FLATPUSH_DATA", ROOT / ".." / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"the recorded data are not in {folder} (set FLATPUSH_DATA)")
+    return folder
+
+
+TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
+RECTANGLE = [(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)]
+
+
+@pytest.fixture(scope="session")
+def triangle() -> fp.Object:
+    return fp.Object(TRIANGLE, friction=0.3, name="triangle")
+
+
+@pytest.fixture(scope="session")
+def rectangle() -> fp.Object:
+    return fp.Object(RECTANGLE, "outline", friction=0.3, name="rectangle")
+
+
+@pytest.fixture(scope="session")
+def three_feet() -> fp.Object:
+    feet = fp.Support.points([(-0.018, -0.012), (0.02, -0.01), (0.0, 0.014)], [1, 1, 1])
+    return fp.Object(RECTANGLE, feet, friction=0.3, name="three feet")
+
+
+@pytest.fixture(scope="session")
+def two_finger_plan(triangle) -> fp.Plan:
+    scene = fp.Scene(triangle, (0.06, 0.02, 2.356), pusher=fp.Pusher(fingers=2, spacing=0.018))
+    return fp.plan(scene)
+
+
+@pytest.fixture(scope="session")
+def one_finger_plan(rectangle) -> fp.Plan:
+    return fp.plan(fp.Scene(rectangle, (0.02, -0.05, 0.3)))
+
+
+def final_error(rollout: fp.Rollout, goal) -> tuple[float, float]:
+    """Distance [m] and angle [rad] from the goal."""
+    from flatpush.geometry import pose_error
+
+    error = pose_error(rollout.final_pose, goal)
+    return float(np.hypot(error[0], error[1])), abs(float(error[2]))

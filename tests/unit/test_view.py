@@ -1,0 +1,445 @@
+"""Figures and animations: what is drawn where, in which files, and what is refused."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+from PIL import Image
+
+from flatpush.errors import InputError
+from flatpush.geometry import Outline, compose, exp, inverse, transform
+from flatpush.problem import (
+    Arc,
+    Certificate,
+    Object,
+    Plan,
+    Push,
+    Pusher,
+    PushSegment,
+    Rollout,
+    Scene,
+    TransitSegment,
+    Workspace,
+)
+from flatpush.view import PushSketch, check_figure, describe_figure, save_figure
+from flatpush.view.canvas import drawing_style, legend_below, new_figure
+from flatpush.view.sketch import _sense
+from flatpush.view.timeline import Timeline, doing
+from flatpush.view.trace import fingertips, rollout_paths, trace_pushes
+
+TRIANGLE = 1e-3 * np.array([[19.667, -9.5], [19.667, 19.0], [-39.333, -9.5]])
+LEFT, RIGHT = (
+    np.array([-0.125, 0.0375]),
+    np.array([0.125, 0.0375]),
+)  # turning centres of a push along +y, in O
+SPEED = 0.02
+
+
+def about(centre, turn):
+    """A body twist in O about a centre; + counter-clockwise; the flat point moves with SPEED."""
+    w = turn * SPEED / 0.125
+    return np.array([w * centre[1], -w * centre[0], w])
+
+
+ARCS = {"left": about(LEFT, 1), "right": about(RIGHT, -1), "straight": np.array([0.0, SPEED, 0.0])}
+
+
+def one_push(start, turns=("left", "straight", "right"), name="long edge"):
+    """A push along +y of O that spends three seconds on each turn."""
+    times, poses, arcs = [0.0], [np.asarray(start, dtype=float)], []
+    for turn in turns:
+        arcs.append(Arc(turn, ARCS[turn], 3.0, 3.0 * SPEED))
+        begin = poses[-1]
+        for s in np.arange(1, 31) / 30:
+            times.append(3.0 * (len(arcs) - 1 + s))
+            poses.append(compose(begin, exp(3.0 * s * ARCS[turn])))
+    objects = np.array(poses)
+    pusher = compose(objects, [0.0, -0.012, np.pi / 2])
+    tips = np.array([[0.0, 0.009], [0.0, -0.009]])
+    word = "".join(turn[0].upper() for turn in turns)
+    return PushSegment(name, word, tuple(arcs), np.array(times), objects, pusher, tips)
+
+
+def transit(start, end, lifted=0.0):
+    times = np.array([0.0, 0.5, 1.0])
+    return TransitSegment(times, np.array([start, end, end]), np.array([0.0, lifted, 0.0]))
+
+
+def make_plan(
+    turns=("left", "straight", "right"), pushes=1, cars=True, name="triangle", push="long edge", **workspace
+):
+    thing = Object(Outline.polygon(TRIANGLE), "uniform", 0.3, name=name)
+    at = thing.outline.nearest((0.0, -0.0095))
+    start = [0.05, -0.15, 0.4]
+    segments, pose = [], np.array(start)
+    for _ in range(pushes):
+        segment = one_push(pose, turns, push)
+        before = compose(segment.pusher[0], [-0.01, 0.0, 0.0])
+        after = compose(segment.pusher[-1], [-0.01, 0.0, 0.0])
+        came = segments[-1].pusher[-1] if segments else before
+        segments += [transit(came, before, 0.03 if segments else 0.0), transit(before, segment.pusher[0])]
+        segments += [segment, transit(segment.pusher[-1], after)]
+        pose = segment.object[-1]
+    scene = Scene(
+        thing,
+        start,
+        pose,
+        Pusher(fingers=2, spacing=0.018),
+        (Push(push, at, 2, 0.018),),
+        Workspace(**workspace),
+    )
+    car = {push: {"left_centre": LEFT.tolist(), "right_centre": RIGHT.tolist(), "straight": [0.0, 1.0]}}
+    certificate = Certificate({"cars": car} if cars else {})
+    duration = float(sum(s.times[-1] for s in segments))
+    return Plan("solved", scene, 0.18 * pushes, duration, tuple(segments), certificate)
+
+
+def follow(plan):
+    """A rollout that does what the plan says."""
+    line = Timeline.of(plan)
+    modes = ("sticking",) * len(line.times)
+    return Rollout(line.object[-1], line.times, line.object, line.pusher, modes, "completed")
+
+
+def svg_of(plan, tmp_path, **options):
+    path = tmp_path / "plan.svg"
+    save_figure(plan, path, **options)
+    return path.read_text()
+
+
+def page_data(page):
+    return json.loads(re.search(r"const plan = (.*);", page)[1])
+
+
+# What stands where
+
+
+def test_the_flat_path_is_smooth_and_as_long_as_the_flat_cost():
+    (trace,) = trace_pushes(make_plan())
+    steps = np.diff(trace.flat_path, axis=0)
+    assert np.sum(np.linalg.norm(steps, axis=1)) == pytest.approx(
+        9.0 * SPEED, rel=1e-4
+    )  # chords of 2° at most
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    assert np.max(np.abs(np.diff(headings))) < np.deg2rad(2.1)
+    np.testing.assert_allclose(
+        trace.flat_path[0], transform(trace.marks[0], 0.5 * (LEFT + RIGHT)), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        trace.flat_path[-1], transform(trace.marks[-1], 0.5 * (LEFT + RIGHT)), atol=1e-9
+    )
+
+
+def test_without_a_certificate_the_arcs_tell_the_flat_point_if_they_turn_both_ways():
+    (both,) = trace_pushes(make_plan(cars=False))
+    np.testing.assert_allclose(both.flat_point, [0.0, 0.0375], atol=1e-12)
+    (one_way,) = trace_pushes(make_plan(("left", "straight", "left"), cars=False))
+    assert one_way.flat_point is None
+    assert one_way.flat_path is None
+
+
+def test_a_turn_goes_about_its_centre_and_carries_its_sign():
+    plan = make_plan()
+    (trace,) = trace_pushes(plan)
+    (left, plus), (right, minus) = trace.centres
+    assert (plus, minus) == (1, -1)
+    np.testing.assert_allclose(left, transform(plan.scene.start_pose, LEFT), atol=1e-12)
+    objects = plan.pushes[0].object
+    np.testing.assert_allclose(transform(objects[60:], RIGHT), np.tile(right, (31, 1)), atol=1e-9)
+
+
+def test_the_left_edge_of_the_motion_cone_is_to_the_left_and_turns_clockwise():
+    (trace,) = trace_pushes(make_plan())
+    left, right = trace.motion
+    assert left[0] < 0 < right[0]
+    # The right turn moves the contact point along the left edge.
+    velocity = ARCS["right"][:2] + ARCS["right"][2] * np.array([-trace.contact[1], trace.contact[0]])
+    assert np.cross([*left, 0.0], [*velocity, 0.0])[2] == pytest.approx(0.0, abs=1e-12)
+    assert left @ velocity > 0
+
+
+def test_outlines_stand_at_even_travel_from_start_to_end():
+    plan = make_plan(pushes=3)
+    for trace, push in zip(trace_pushes(plan), plan.pushes, strict=True):
+        np.testing.assert_allclose(trace.marks[[0, -1]], push.object[[0, -1]], atol=1e-12)
+        reach = 0.5 * plan.scene.object.outline.size
+        gaps = np.linalg.norm(np.diff(trace.marks[:, :2], axis=0), axis=1)
+        gaps = gaps + reach * np.abs(np.diff(trace.marks[:, 2]))
+        assert np.ptp(gaps) < 0.05 * np.mean(gaps)
+        assert 2 <= len(trace.marks) <= 36
+        tips = fingertips(trace.pushers, push.fingers)
+        beside = transform(inverse(trace.marks)[:, None], tips)
+        np.testing.assert_allclose(beside[..., 1], -0.012, atol=1e-5)
+
+
+def test_the_object_rests_while_the_pusher_moves_alone():
+    plan = make_plan(pushes=2)
+    line = Timeline.of(plan)
+    assert line.duration == pytest.approx(plan.duration)
+    first_push_ends = line.starts[2] + 9.0
+    rest = plan.pushes[0].object[-1]
+    for later in (0.3, 1.7, 2.4):
+        np.testing.assert_allclose(line.at(first_push_ends + later)[0], rest)
+    assert line.at(line.starts[4] + 0.5)[2] == pytest.approx(0.03)
+    assert [line.at(start)[3] for start in line.starts] == list(
+        range(8)
+    )  # where segments meet, the later one
+    np.testing.assert_allclose(line.at(-1.0)[0], plan.scene.start_pose)
+    np.testing.assert_allclose(line.at(1e9)[0], plan.scene.goal_pose)
+
+
+def test_words_say_what_goes_on():
+    plan = make_plan(pushes=2)
+    line = Timeline.of(plan)
+    begin = line.starts[2]
+    said = [doing(plan, line, begin + t) for t in (1.0, 4.0, 8.0)]
+    assert said == [f"push “long edge”, {how}" for how in ("turning left", "straight", "turning right")]
+    assert doing(plan, line, 0.2) == "pusher alone"
+    assert doing(plan, line, line.starts[4] + 0.5) == "pusher lifted"
+
+
+def test_a_run_that_follows_the_plan_lies_on_its_flat_path():
+    plan = make_plan(pushes=2)
+    traces = trace_pushes(plan)
+    for path, trace in zip(rollout_paths(follow(plan), plan, traces), traces, strict=True):
+        np.testing.assert_allclose(path[0], trace.flat_path[0], atol=1e-9)
+        np.testing.assert_allclose(path[-1], trace.flat_path[-1], atol=1e-9)
+
+
+# Files
+
+
+@pytest.mark.parametrize("pushes", [1, 2, 6])
+def test_svg_is_sound_says_what_it_shows_and_is_as_wide_as_its_page(tmp_path, pushes):
+    root = ElementTree.fromstring(svg_of(make_plan(pushes=pushes), tmp_path))
+    assert root.get("width") == "100%"
+    assert root.get("height") is None
+    assert "triangle" in root.find("{http://www.w3.org/2000/svg}title").text
+
+
+def test_the_same_plan_gives_the_same_bytes(tmp_path):
+    plan = make_plan()
+    for ending in ("svg", "png", "gif", "html"):
+        paths = [tmp_path / f"{k}.{ending}" for k in range(2)]
+        for path in paths:
+            save_figure(plan, path)
+        assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_simulated_run_is_drawn_in_red(tmp_path):
+    plan = make_plan()
+    assert "#d62728" not in svg_of(plan, tmp_path)
+    assert "#d62728" in svg_of(plan, tmp_path, rollouts=[follow(plan)])
+    save_figure(plan, tmp_path / "run.html", [follow(plan)])
+    assert '<path class="simulated"' in (tmp_path / "run.html").read_text()
+
+
+def test_obstacles_and_bounds_are_drawn(tmp_path):
+    square = np.array([[0.1, 0.1], [0.15, 0.1], [0.15, 0.15], [0.1, 0.15]])
+    plan = make_plan(bounds=(-0.3, -0.3, 0.3, 0.3), obstacles=(square,))
+    text = svg_of(plan, tmp_path)
+    assert "#c1272d" in text
+    assert "#3b6fb6" in text
+    assert "#c1272d" not in svg_of(make_plan(), tmp_path)
+
+
+def test_the_legend_of_many_pushes_stays_inside():
+    with drawing_style():
+        figure = new_figure()
+        entries = [Line2D([], [], label=f"{k}: push “a name of some length”, LSR") for k in range(6)]
+        figure.add_subplot()
+        legend_below(figure, entries)
+        assert figure.legends[0].get_window_extent().x1 <= figure.bbox.width
+        assert len(figure.legends) == 1
+
+
+def test_png_is_large_enough_to_read_in_a_readme(tmp_path):
+    save_figure(make_plan(), tmp_path / "plan.PNG")
+    with Image.open(tmp_path / "plan.PNG") as image:
+        assert image.size == (1200, 800)
+
+
+def test_gif_moves_from_the_start_to_the_goal(tmp_path):
+    plan = make_plan()
+    save_figure(plan, tmp_path / "plan.gif")
+    with Image.open(tmp_path / "plan.gif") as film:
+        assert 40 <= film.n_frames <= 130
+        assert film.info["loop"] == 0
+        first = np.asarray(film.convert("RGB")).astype(int)
+        film.seek(film.n_frames - 1)
+        last = np.asarray(film.convert("RGB")).astype(int)
+    assert np.count_nonzero(np.abs(first - last).sum(axis=-1) > 60) > 500
+    assert (first[0, 0] == 255).all()
+
+
+def test_html_stands_alone_and_plays_the_plan(tmp_path):
+    plan = make_plan(pushes=2)
+    save_figure(plan, tmp_path / "plan.html")
+    page = (tmp_path / "plan.html").read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)\s*=|url\(|@import|https?://|fetch\(|XMLHttp", page)
+    data, line = page_data(page), Timeline.of(plan)
+    np.testing.assert_allclose(data["times"], line.times, atol=1e-6)
+    np.testing.assert_allclose(np.array(data["object"]) / [1e3, 1e3, 1], line.object, atol=1e-5)
+    assert [s["push"] for s in data["segments"]] == [None, None, "long edge", None] * 2
+    assert all(len(s["tips"]) == 2 for s in data["segments"])
+    turns = data["segments"][2]["turns"]
+    assert [t["turn"] for t in turns] == ["left", "straight", "right"]
+    np.testing.assert_allclose(turns[0]["centre"], 1e3 * transform(plan.scene.start_pose, LEFT), atol=1e-3)
+    assert turns[-1]["end"] == pytest.approx(line.starts[2] + 9.0)
+    assert "$" not in page
+
+
+def test_names_cannot_break_out_of_the_page_or_the_picture(tmp_path):
+    evil = '</script><img onerror="x"> $x^$ & “ 三角'
+    plan = make_plan(name=evil, push=evil)
+    save_figure(plan, tmp_path / "plan.html")
+    page = (tmp_path / "plan.html").read_text(encoding="utf-8")
+    assert page.count("</script>") == 1
+    assert "<img" not in page
+    assert page_data(page)["segments"][2]["push"] == evil
+    ElementTree.fromstring(svg_of(plan, tmp_path))
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "gif", "html"])
+def test_a_plan_without_segments_and_no_plan_are_drawn_too(tmp_path, ending):
+    scene = make_plan().scene
+    nothing = Plan("solved", replace(scene, goal=scene.start), 0.0)
+    failed = Plan("no_plan", scene, reason="no listed push can steer; " * 12)
+    for plan in (nothing, failed):
+        save_figure(plan, tmp_path / f"plan.{ending}")
+        assert (tmp_path / f"plan.{ending}").stat().st_size > 1000
+
+
+def test_a_circle_with_one_finger_and_pushes_without_a_list(tmp_path):
+    plan = make_plan()
+    disc = Object(Outline.circle(0.02), "uniform", 0.3, name="disc")
+    push = replace(plan.pushes[0], fingers=np.zeros((1, 2)))
+    segments = tuple(push if s.kind == "push" else s for s in plan.segments)
+    scene = replace(plan.scene, object=disc, pushes="auto", pusher=Pusher())
+    for ending in ("svg", "gif", "html"):
+        save_figure(replace(plan, scene=scene, segments=segments), tmp_path / f"disc.{ending}")
+
+
+# What is refused
+
+
+@pytest.mark.parametrize("name", ["plan.pdf", "plan", "plan.svg.txt", ".svg"])
+def test_another_ending_is_refused_and_the_four_are_named(tmp_path, name):
+    with pytest.raises(InputError, match=r"\.svg, \.png, \.gif or \.html"):
+        save_figure(make_plan(), tmp_path / name)
+    with pytest.raises(InputError, match=r"\.html"):
+        check_figure(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_folder_and_a_folder_are_refused(tmp_path):
+    (tmp_path / "folder.svg").mkdir()
+    for path in (tmp_path / "missing" / "plan.svg", tmp_path / "folder.svg"):
+        with pytest.raises(InputError, match=re.escape(str(path))):
+            save_figure(make_plan(), path)
+        with pytest.raises(InputError, match=re.escape(str(path))):
+            check_figure(path)
+    check_figure(tmp_path / "plan.svg")
+    assert [p.name for p in tmp_path.rglob("*")] == ["folder.svg"]
+
+
+def test_importing_the_package_imports_neither_matplotlib_nor_pillow():
+    code = "import sys, flatpush.view; print([m for m in ('matplotlib', 'PIL') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_drawing_leaves_matplotlib_as_it_was(tmp_path):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    loaded = "matplotlib.pyplot" in sys.modules
+    save_figure(make_plan(), tmp_path / "plan.svg")
+    assert dict(matplotlib.rcParams) == before
+    assert ("matplotlib.pyplot" in sys.modules) == loaded
+
+
+# Sketches
+
+
+def sketch(refusal="", **changes):
+    nan = np.full(2, np.nan)
+    centres = {
+        "left_centre": LEFT,
+        "right_centre": RIGHT,
+        "flat_point": np.array([0, 0.0375]),
+        "straight": np.array([0, 1.0]),
+    }
+    if refusal:
+        centres = dict.fromkeys(centres, nan)
+    values = {
+        "name": "long edge",
+        "contact_points": np.array([[-0.009, -0.0095], [0.009, -0.0095]]),
+        "normal": np.array([0.0, 1.0]),
+        "fingertips": np.array([[-0.009, -0.012], [0.009, -0.012]]),
+        "tip_radius": 0.0025,
+        "friction": 0.3,
+        "cof": np.zeros(2),
+        "force_left": np.array([-0.3, 1.0]),
+        "force_right": np.array([0.3, 1.0]),
+        "motion_left": np.array([-0.4, 1.0]),
+        "motion_right": np.array([0.4, 1.0]),
+        **centres,
+        "refusal": refusal,
+    }
+    return PushSketch(**{**values, **changes})
+
+
+def drawn(sketches, tmp_path):
+    path = tmp_path / "pushes.svg"
+    describe_figure(make_plan().scene, sketches, path)
+    return path.read_text()
+
+
+def test_a_sketch_shows_both_rays_and_the_flat_point(tmp_path):
+    text = drawn([sketch()], tmp_path)
+    ElementTree.fromstring(text)
+    assert "#c2189b" in text  # clockwise ray
+    assert "#e3000f" in text  # flat point
+    assert text == drawn([sketch()], tmp_path)
+
+
+def test_a_refused_push_shows_its_reason_instead(tmp_path):
+    text = drawn([sketch(refusal="off by 4.1 deg")], tmp_path)
+    assert "#c2189b" not in text
+    assert "off by 4.1 deg" in re.sub(r"<[^!].*?>", "", text)  # glyphs carry their text as a comment
+
+
+def test_every_number_of_pushes_fits(tmp_path):
+    path = tmp_path / "pushes.png"
+    heights = []
+    for count in (1, 3):
+        describe_figure(make_plan().scene, [sketch()] * count, path)
+        with Image.open(path) as image:
+            heights.append(image.size[1])
+    assert heights[1] > 2 * heights[0]
+
+
+def test_far_and_single_contacts_are_drawn(tmp_path):
+    far = sketch(left_centre=1e2 * LEFT, right_centre=1e2 * RIGHT)
+    single = sketch(contact_points=np.array([[0.0, -0.0095]]), fingertips=np.array([[0.0, -0.012]]))
+    ElementTree.fromstring(drawn([far, single], tmp_path))
+
+
+def test_centres_of_a_curve_are_told_apart_by_their_sense():
+    """A centre to the left of a push along +y is of a counter-clockwise turn."""
+    centres = np.array([[-0.2, 0.03], [-9.0, 0.03], [np.nan, np.nan], [9.0, 0.03], [0.2, 0.03]])
+    assert _sense(sketch(centres=centres)).tolist() == [1.0, 1.0, 0.0, -1.0, -1.0]
+
+
+def test_sketches_are_refused_in_other_formats_and_without_a_push(tmp_path):
+    with pytest.raises(InputError, match=r"\.svg or \.png"):
+        describe_figure(make_plan().scene, [sketch()], tmp_path / "pushes.gif")
+    with pytest.raises(InputError, match="at least one push"):
+        describe_figure(make_plan().scene, [], tmp_path / "pushes.svg")
