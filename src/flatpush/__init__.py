@@ -57,7 +57,46 @@ _NAMES = {
 }
 _MODULES = ("dubins",)
 
-__all__ = ["__version__", *sorted([*_NAMES, *_MODULES])]  # noqa: PLE0604
+__all__ = [
+    "Arc",
+    "Certificate",
+    "Claim",
+    "CollinearSupportWarning",
+    "ContactMode",
+    "Ellipsoid",
+    "Exact",
+    "FlatpushError",
+    "InputError",
+    "LimitSurface",
+    "MissingExtra",
+    "NoDubinsReduction",
+    "Object",
+    "Outline",
+    "Perturbation",
+    "Plan",
+    "Planning",
+    "PointContact",
+    "Push",
+    "Pusher",
+    "Quartic",
+    "Report",
+    "Rollout",
+    "Scene",
+    "Support",
+    "Workspace",
+    "__version__",
+    "describe",
+    "dubins",
+    "fit_ellipsoid",
+    "fit_quartic",
+    "flat_output",
+    "load_plan",
+    "load_scene",
+    "plan",
+    "simulate",
+    "two_point_sticks",
+    "verify",
+]
 
 if TYPE_CHECKING:
     from .contact import ContactMode, PointContact, two_point_sticks

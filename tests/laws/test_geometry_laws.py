@@ -105,9 +105,9 @@ def test_a_circle_is_an_outline():
     ("vertices", "words"),
     [
         ([(0, 0), (1, 0)], "at least three different corners"),
-        ([(0, 0), (1, 0), (0, 0), (1, 0)], "encloses an area"),
+        ([(0, 0), (1, 0), (0.5, 0), (1, 0)], "encloses an area"),
         ([(0, 0), (1, 0), (2, 0)], "encloses an area"),
-        ([(0, 0), (1, 1), (1, 0), (0, 1)], "encloses an area|cross"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], "cross"),
         ([(0, 0), (2, 2), (2, 0), (0, 1)], "cross"),
         ([(0, 0), (1, 0), (float("nan"), 1)], "finite"),
     ],
@@ -119,5 +119,5 @@ def test_bad_outlines_are_refused(vertices, words):
 
 def test_repeated_corners_are_dropped():
     outline = Outline.polygon([(0, 0), (0, 0), (1, 0), (1, 1), (1, 1), (0, 1), (0, 0)])
-    assert len(outline.vertices) == 4
+    assert outline.vertices.tolist() == [[0, 0], [1, 0], [1, 1], [0, 1]]  # edge 0 still starts at the first
     assert outline.area == pytest.approx(1.0)

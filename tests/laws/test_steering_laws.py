@@ -80,6 +80,26 @@ def test_a_driven_word_is_found_again():
         assert min(np.max(np.abs(p - driven.parameters)) for p in parameters) <= 1e-6
 
 
+def test_words_with_vanishing_pieces_make_no_spurious_turn():
+    """One or two pieces, whole angles and tangent circles: never dearer than what was driven."""
+    from flatpush.steering import kernels
+
+    rng = np.random.default_rng(10)
+    weights = np.ones(3)
+    for _ in range(COMPARED):
+        car, start = random_car(rng), random_pose(rng)
+        name = WORDS[rng.integers(6)]
+        driven = rng.choice([np.pi / 2, np.pi, 0.3, rng.uniform(0.1, 5)], 3) * (
+            rng.permutation(3) < rng.integers(3)
+        )
+        goal = end_pose(Word(name, driven, 0.0), *car, start)
+        goal[2] += rng.choice([-1, 0, 1]) * 2 * np.pi
+        best = shortest_word(*car, start, goal, weights)
+        assert best.cost <= np.sum(driven) + 1e-8
+        assert np.max(np.abs(pose_error(end_pose(best, *car, start), goal))) <= END
+        assert kernels.shortest_word(*car, start, goal, weights)[4] <= np.sum(driven) + 1e-8
+
+
 @settings(deadline=None, max_examples=300, derandomize=True)
 @given(pose, pose, st.floats(0.1, 3.0), position, position, angle)
 def test_perpendicular_cars_are_dubins_cars(start, goal, radius, x, y, heading):

@@ -75,7 +75,7 @@ def test_a_foot_under_the_centre_of_rotation_leaves_its_force_free():
     for force in ends:
         free = force - wrenches.centre[:2]
         assert np.hypot(*free) == pytest.approx(wrenches.radius)
-        whole = wrenches.centre + [*free, foot[0] * free[1] - foot[1] * free[0]]
+        whole = wrenches.centre + np.array([*free, foot[0] * free[1] - foot[1] * free[0]])
         assert whole == pytest.approx(contact.wrench(force))
     assert np.ptp(contact.force_angles(ends)) > 0.01
 
@@ -141,7 +141,7 @@ def test_the_composite_margin_is_where_sticking_ends():
 
 
 def test_a_free_foot_widens_what_two_fingers_carry():
-    """A rotation about a support point: any force of that foot up to its share may complete the wrench (methods 1.17)."""
+    """A rotation about a support point: any force of that foot up to its share may complete the wrench."""
     support = Support.points([(0.03, 0.0), (-0.02, 0.02), (-0.02, -0.02)], [2, 1, 1]).centred()
     surface = Exact(support)
     foot = support.feet[0][0]
@@ -170,7 +170,9 @@ def test_a_free_foot_widens_what_two_fingers_carry():
         centre_inside = np.all(np.array(facets) @ free.centre >= 0)
         assert sticks or not inside
         if sticks and not inside:  # the grid may miss a sliver
-            near = np.max(np.min(F @ (np.array(facets) / np.linalg.norm(facets, axis=1, keepdims=True)).T, axis=1))
+            near = np.max(
+                np.min(F @ (np.array(facets) / np.linalg.norm(facets, axis=1, keepdims=True)).T, axis=1)
+            )
             assert near > -0.02
         widened += bool(sticks and not centre_inside)
     assert widened > 0
@@ -192,7 +194,9 @@ def test_two_fingers_on_an_edge_stand_square_to_it(edge):
     for tip in placement.tips:
         assert TRIANGLE.nearest(tip).distance == pytest.approx(0.0025)
     # E's left is its +y: the first tip stands at +spacing/2.
-    assert placement.tips[0] - placement.tips[1] == pytest.approx(0.018 * rotate(placement.pose[2], [0.0, 1.0]))
+    assert placement.tips[0] - placement.tips[1] == pytest.approx(
+        0.018 * rotate(placement.pose[2], [0.0, 1.0])
+    )
 
 
 def test_two_fingers_fit_into_a_concave_side():

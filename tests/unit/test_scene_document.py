@@ -110,6 +110,15 @@ def test_every_number_follows_the_units(units: dict[str, str], per_mm: float, de
     assert plan.friction_margin == 0.1
 
 
+def test_whole_millimetres_become_the_nearest_metres() -> None:
+    """9 * 0.001 is 0.009000000000000001; a plan should hold 0.009."""
+    scene = parse_scene(minimal(start=[9, 18, 0], goal=[36, 72, 0]))
+    assert scene.start_pose.tolist() == [0.009, 0.018, 0.0]
+    corners = [[0, 0], [9, 0], [0, 18]]
+    outline = parse_scene(minimal(object={"outline": corners, "friction": 0.3})).object.outline
+    assert outline.vertices.tolist() == [[0.0, 0.0], [0.009, 0.0], [0.0, 0.018]]
+
+
 def test_a_switching_cost_in_seconds_has_no_length() -> None:
     scene = scene_in({"length": "mm", "angle": "deg"}, 1.0, 1.0, cost="time", switch_cost=2)
     assert scene.planning.switching == 2.0
@@ -304,7 +313,10 @@ def test_surfaces(tmp_path: Path) -> None:
         (Quartic(np.array(coefficients)), "quartic", coefficients),
     ):
         save_surface(surface, tmp_path / "surface.json")
-        assert json.loads((tmp_path / "surface.json").read_text()) == {"flatpush": "surface/1", name: values}
+        assert json.loads((tmp_path / "surface.json").read_text(encoding="utf-8")) == {
+            "flatpush": "surface/1",
+            name: values,
+        }
         assert type(load_surface(tmp_path / "surface.json")) is type(surface)
         for form in ({name: values}, {"file": "surface.json"}):
             document = minimal(object={"outline": {"circle": 40}, "friction": 0.3, "surface": form})
@@ -358,9 +370,9 @@ def test_the_template_states_the_defaults() -> None:
 
 
 def test_the_reference_names_every_key() -> None:
-    text = (ROOT / "docs" / "scene.md").read_text()
+    text = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
     for key in descriptions(scene_schema()):
-        assert f"`{key.rsplit('.', 1)[-1]}" in text, key
+        assert re.search(rf"`[^`\n]*\b{key.rsplit('.', 1)[-1]}\b", text), key
 
 
 def test_the_examples_are_there() -> None:
@@ -383,7 +395,7 @@ def test_examples_load_and_fit_the_schema(path: Path) -> None:
     document = scene_document(scene)
     validator.validate(document)
     assert_same(scene, parse_scene(document))
-    assert path.read_text().startswith("# ")
+    assert path.read_text(encoding="utf-8").startswith("# ")
 
 
 def test_the_butterfly_is_drawn_as_it_says() -> None:
@@ -398,7 +410,7 @@ def test_the_shipped_schemas_are_current() -> None:
     """python -c "from flatpush.documents.schema import write_schemas; write_schemas()" renews them."""
     for name, schema in (("scene", scene_schema()), ("plan", plan_schema())):
         jsonschema.Draft202012Validator.check_schema(schema)
-        assert json.loads((FOLDER / f"{name}.schema.json").read_text()) == schema
+        assert json.loads((FOLDER / f"{name}.schema.json").read_text(encoding="utf-8")) == schema
 
 
 def test_the_schema_refuses_what_the_reader_refuses() -> None:

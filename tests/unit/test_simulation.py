@@ -1,16 +1,17 @@
 """The judge: rollouts and claims, and that they notice what is wrong."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.errors import InputError
 from flatpush.geometry import compose, pose_error
 from flatpush.problem import Certificate
 from flatpush.steering.car import Car
-from tests.conftest import final_error
 
 HUNDREDTH, TWENTIETH = 1e-5, 5e-5
 
@@ -132,9 +133,11 @@ def test_the_finger_that_keeps_its_direction_rolls(rectangle):
     contacts = []
     for i in (touches[0], touches[len(touches) // 2], touches[-1]):
         pose, tip = rollout.object[i], rollout.pusher[i][:2]
-        local = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]]) @ (tip - pose[:2])
+        local = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]]) @ (
+            tip - pose[:2]
+        )
         contacts.append((rectangle.outline.nearest(local), pose[2]))
-    for (a, angle_a), (b, angle_b) in zip(contacts[:-1], contacts[1:], strict=True):
+    for (a, angle_a), (b, angle_b) in pairwise(contacts):
         left = np.array([-a.normal[1], a.normal[0]])
         assert (b.point - a.point) @ left == pytest.approx(0.004 * (angle_b - angle_a), abs=1e-6)
     assert abs(contacts[-1][1] - contacts[0][1]) > 0.1
@@ -144,10 +147,14 @@ def test_verify_recomputes_what_is_stated(one_finger_plan, two_finger_plan):
     for plan in (one_finger_plan, two_finger_plan):
         report = fp.verify(plan)
         assert report.ok, report.failed
-        assert {"cost", "duration", "goal_error", "friction_margin"} <= {claim.name for claim in report.claims}
+        assert {"cost", "duration", "goal_error", "friction_margin"} <= {
+            claim.name for claim in report.claims
+        }
 
 
-@pytest.mark.parametrize("key", ["friction_margin", "growth", "curvature_margin", "motion_cone_margin_degrees"])
+@pytest.mark.parametrize(
+    "key", ["friction_margin", "growth", "curvature_margin", "motion_cone_margin_degrees"]
+)
 def test_an_edited_claim_is_refused(one_finger_plan, key):
     values = dict(one_finger_plan.certificate)
     values[key] = values[key] * (1 + 1e-5)
@@ -179,8 +186,10 @@ def test_edited_plans_are_refused(one_finger_plan):
         "arc cost": with_push(arcs=(replace(arc, cost=arc.cost * 1.001), *push.arcs[1:])),
         "turn": with_push(arcs=(replace(arc, turn="straight"), *push.arcs[1:])),
         "times": with_push(times=push.times * 0.9),
-        "goal": replace(plan, scene=replace(plan.scene, goal=plan.scene.goal_pose + [1e-3, 0, 0])),
-        "friction": replace(plan, scene=replace(plan.scene, object=replace_friction(plan.scene.object, 0.31))),
+        "goal": replace(plan, scene=replace(plan.scene, goal=plan.scene.goal_pose + np.array([1e-3, 0, 0]))),
+        "friction": replace(
+            plan, scene=replace(plan.scene, object=replace_friction(plan.scene.object, 0.31))
+        ),
         "push name": with_push(push="nowhere"),
         "no retreat": replace(plan, segments=plan.segments[:-1]),
     }

@@ -26,8 +26,24 @@ def numbers(text: str | None, count: int, option: str) -> list[float] | None:
 
 
 def pose_text(pose: Any) -> str:
-    """A pose in mm and degrees."""
-    return f"({1000 * pose[0]:.2f} mm, {1000 * pose[1]:.2f} mm, {math.degrees(pose[2]):.2f}°)"
+    """A pose in mm and degrees, the angle within half a turn."""
+    x, y, angle = (
+        round(value, 2) + 0.0
+        for value in (1000 * pose[0], 1000 * pose[1], math.remainder(math.degrees(pose[2]), 360))
+    )
+    return f"({x:.2f} mm, {y:.2f} mm, {angle:.2f}°)"
+
+
+def error_text(distance: float, turn: float) -> str:
+    """A distance [m] and an angle [rad] in mm and degrees; what is below a thousandth is said to be so."""
+    mm, degrees = 1000 * distance, math.degrees(abs(turn))
+    return ("<0.001 mm" if mm < 0.001 else f"{mm:.3f} mm") + (
+        " and <0.001°" if degrees < 0.001 else f" and {degrees:.3f}°"
+    )
+
+
+def growth_text(growth: float) -> str:
+    return f"{growth:.1f}-fold" if growth < 1000 else f"{growth:.0e}-fold"
 
 
 def cost_text(cost: float, kind: str) -> str:

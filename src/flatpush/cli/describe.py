@@ -25,8 +25,8 @@ def command(
     with telling("describing"):
         pushes = describe(asked)
     if figure is not None:
-        from ..view.sketches import sketches
         from ..view import describe_figure
+        from ..view.sketches import sketches
 
         describe_figure(asked, sketches(asked, pushes), figure)
     data = {
@@ -96,7 +96,9 @@ def _tell(data: dict[str, Any]) -> None:
                 f" right about ({mm * right[0]:.1f}, {mm * right[1]:.1f}) mm;"
                 f" flat point ({mm * z[0]:.1f}, {mm * z[1]:.1f}) mm"
             )
-            typer.echo(f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm")
+            typer.echo(
+                f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm"
+            )
         radii = {k: ("—" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
         typer.echo("  turning radius [mm]: " + ", ".join(f"{k} {r}" for k, r in radii.items()))
         known = [r for r in push["radii"].values() if r is not None]

@@ -25,7 +25,7 @@ def command(
 
         raise InputError("export writes a .csv file", value=str(file))
     frame = numbers(base_frame, 4, "--base-frame")
-    rows = export_csv(load_plan(plan), file, None if frame is None else tuple(frame))  # type: ignore[arg-type]
+    rows = export_csv(load_plan(plan), file, None if frame is None else tuple(frame))
     if as_json:
         print_json({"file": str(file), "rows": rows})
     else:

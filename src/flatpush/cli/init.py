@@ -17,7 +17,9 @@ def command(
     from ..documents import scene_template, write_atomically
 
     if file.exists():
-        raise InputError("this file exists already and is not overwritten", source=str(file), hint="Name another one.")
+        raise InputError(
+            "this file exists already and is not overwritten", source=str(file), hint="Name another one."
+        )
     write_atomically(file, scene_template())
     if as_json:
         print_json({"file": str(file)})

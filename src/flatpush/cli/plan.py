@@ -1,11 +1,12 @@
 """flatpush plan: plans, verifies, writes."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .common import cost_text, numbers, pose_text, print_json, telling
+from .common import cost_text, error_text, growth_text, numbers, pose_text, print_json, telling
 
 
 def command(
@@ -57,7 +58,10 @@ def command(
     report = verify(found)
     if not report.ok:
         for claim in report.failed:
-            typer.echo(f"claim {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True)
+            typer.echo(
+                f"claim {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})",
+                err=True,
+            )
         typer.echo("the plan fails its own verification; nothing was written", err=True)
         return 4
     if output is not None:
@@ -87,25 +91,24 @@ def _tell(plan: Any, output: Path | None, figure: Path | None) -> None:
         f" planned in {plan.run['planning_time']:.2f} s with the {scene.planning.model} model"
     )
     if plan.segments:
+        x, y, angle = certificate.goal_error
         typer.echo(
-            f"certificate: goal met within {_goal_text(certificate.goal_error)},"
+            f"certificate: goal met within {error_text(math.hypot(x, y), angle)},"
             f" friction margin {100 * certificate.friction_margin:.0f} % of μ"
             f" ({certificate.friction_margin_degrees:.1f}°)"
             + (
                 f", both contacts keep {100 * certificate.composite_margin:.0f} % of μ in reserve"
                 if certificate.composite_margin is not None
-                else f", a small error grows {certificate.growth:.1f}-fold"
+                else f", a small error grows {growth_text(certificate.growth)}"
             )
-            + (f", clearance {1000 * certificate.clearance:.2f} mm" if certificate.clearance is not None else "")
+            + (
+                f", clearance {1000 * certificate.clearance:.2f} mm"
+                if certificate.clearance is not None
+                else ""
+            )
         )
     for warning in certificate.warnings:
         typer.echo(f"warning: {warning}", err=True)
     for path in (output, figure):
         if path is not None:
             typer.echo(f"wrote {path}")
-
-
-def _goal_text(error: Any) -> str:
-    import math
-
-    return f"{1000 * math.hypot(error[0], error[1]):.2g} mm and {math.degrees(abs(error[2])):.2g}°"

@@ -7,15 +7,19 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from .common import pose_text, print_json, telling
+from .common import error_text, pose_text, print_json, telling
 
 
 def command(
     plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
     runs: Annotated[int, typer.Option(help="How many; more than one perturbs start and friction.")] = 1,
     seed: Annotated[int, typer.Option(help="Of the perturbations.")] = 0,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write every run here (JSON).")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Draw plan and runs: .svg, .png, .gif or .html.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write every run here (JSON).")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw plan and runs: .svg, .png, .gif or .html.")
+    ] = None,
     model: Annotated[str, typer.Option(help="Limit surface: exact, ellipsoid, local or quartic.")] = "exact",
     source: Annotated[str, typer.Option(help="The pusher follows the plan's arcs or its samples.")] = "arcs",
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -58,14 +62,14 @@ def command(
     if runs == 1:
         r = results[0]
         typer.echo(f"{r['outcome']}: the object ends at {pose_text(r['final_pose'])}")
-        typer.echo(f"off the goal by {1000 * r['distance']:.3f} mm and {math.degrees(r['turn']):.3f}°")
+        typer.echo(f"off the goal by {error_text(r['distance'], r['turn'])}")
         typer.echo("modes: " + ", ".join(f"{name} {count}" for name, count in r["modes"].items()))
     else:
         s = _summary(results)
         typer.echo(f"{runs} runs: " + ", ".join(f"{count} {name}" for name, count in s["outcomes"].items()))
         typer.echo(
-            f"off the goal: median {1000 * s['median_distance']:.2f} mm and {math.degrees(s['median_turn']):.2f}°,"
-            f" worst {1000 * s['worst_distance']:.2f} mm and {math.degrees(s['worst_turn']):.2f}°"
+            f"off the goal: median {error_text(s['median_distance'], s['median_turn'])},"
+            f" worst {error_text(s['worst_distance'], s['worst_turn'])}"
         )
     for path in (output, figure):
         if path is not None:

@@ -38,9 +38,13 @@ def command(
         )
     else:
         for claim in report.failed:
-            typer.echo(f"✗ {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True)
+            typer.echo(
+                f"✗ {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True
+            )
         good = len(report.claims) - len(report.failed)
-        typer.echo(f"{good} of {len(report.claims)} claims hold: " + ("verified" if report.ok else "NOT verified"))
+        typer.echo(
+            f"{good} of {len(report.claims)} claims hold: " + ("verified" if report.ok else "NOT verified")
+        )
     return 0 if report.ok else 4
 
 

@@ -2,7 +2,7 @@
 
 from .placement import Placement, place_fingers
 from .point_contact import ContactMode, Motion, PointContact
-from .straight import straight_force
+from .straight import steering_forces, straight_force
 from .two_point import composite_margin, two_point_sticks
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "PointContact",
     "composite_margin",
     "place_fingers",
+    "steering_forces",
     "straight_force",
     "two_point_sticks",
 ]

@@ -1,5 +1,6 @@
 """Where the fingertips of a push stand: both touch the outline, and neither overlaps it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +56,9 @@ def place_fingers(
     if fingers == 1:
         tip = at.point - tip_radius * at.normal
         if outline.nearest(tip).distance < tip_radius - 1e-9 * outline.size:
-            raise InputError("the fingertip does not fit there without overlapping the outline", value=at.point)
+            raise InputError(
+                "the fingertip does not fit there without overlapping the outline", value=at.point
+            )
         pose = np.array([*tip, np.arctan2(at.normal[1], at.normal[0])])
         return Placement(at.point[None], at.normal[None], tip[None], pose)
 
@@ -74,8 +77,7 @@ def place_fingers(
 
     angle = _balance(imbalance, heading, 1e-12 * outline.size)
     left, right = reach(angle)
-    assert left is not None and right is not None  # or imbalance would have raised
-    if abs(left[0] - right[0]) > 1e-7 * outline.size:
+    if left is None or right is None or abs(left[0] - right[0]) > 1e-7 * outline.size:
         raise InputError("the two fingers cannot both touch the outline there", value=at.point)
     x = rotate(angle, [1.0, 0.0])
     y = perpendicular(x)
@@ -142,7 +144,7 @@ def _normal(outline: Outline, point: Array, tip: Array) -> Array:
     return away / np.hypot(*away) if np.hypot(*away) > 0 else (before + after) / np.hypot(*(before + after))
 
 
-def _balance(imbalance, start: float, tolerance: float) -> float:  # type: ignore[no-untyped-def]
+def _balance(imbalance: Callable[[float], float], start: float, tolerance: float) -> float:
     """A zero of the imbalance near the start angle: outward scan for a change of sign, then bisection."""
     value = imbalance(start)
     if abs(value) <= tolerance:

@@ -172,6 +172,6 @@ class PointContact:
         return np.arctan2(cross(self.normal, f), f @ self.normal)
 
     def _drags(self, surface: LimitSurface, mode: ContactMode) -> bool:
-        """Whether friction alone can carry the object along its edge: the motion cone reaches past the edge's direction."""
+        """Whether friction alone can carry the object along its edge: the motion cone reaches past it."""
         left, right = self.motion_cone(surface)
         return float((left if mode is ContactMode.SLIDING_LEFT else right) @ self.normal) < 0

@@ -1,14 +1,64 @@
-"""The force at a contact that moves an object without turning it."""
+"""The forces at a contact that steer an object: straight on, and the most to either side that a margin leaves."""
 
 import numpy as np
 
-from ..errors import NoDubinsReduction
+from ..errors import InputError, NoDubinsReduction
 from ..friction.ellipsoid import Ellipsoid
 from ..friction.exact import Exact
 from ..friction.surface import LimitSurface
-from ..geometry import rotate
+from ..geometry import rotate, velocity_at
 from ..geometry.pose import Array
 from .point_contact import PointContact
+
+# Where an edge cannot be used, the forces used stay off its replacement by at least this fraction.
+PAST_EDGE = 0.01
+
+
+def steering_forces(contact: PointContact, surface: LimitSurface, margin: float) -> Array:
+    """Unit forces on the left edge, straight, and on the right edge of the friction cone less a margin, shape (3, 2).
+
+    Each edge is moved towards the straight force by a fraction of the angle between them. Two kinds of edge cannot be
+    used, and the cone then counts as ending earlier, before the same fraction is taken again:
+
+    * Where the twist of the moved edge is a rotation about a support point, many forces share it. If some of them lie
+      outside the whole friction cone, the contact would be at the brink of sliding.
+    * Where the contact point would have to move against the inward normal, the fingertip would leave it.
+
+    Raises:
+        InputError: if the margin is not in [0, 1).
+        NoDubinsReduction: as straight_force.
+    """
+    if not 0 <= margin < 1:
+        raise InputError("the friction margin is at least 0 and less than 1", value=margin)
+    straight = straight_force(contact, surface)
+    base = float(contact.force_angles(straight))
+    forces = []
+    for edge, side in zip(contact.force_edges(), (1.0, -1.0), strict=True):
+        angle = float(contact.force_angles(edge))
+        angle += margin * (base - angle)
+        shared = side * contact.force_angles(
+            contact.forces(surface.wrench_set(_twist(contact, surface, angle)))
+        )
+        if np.max(shared) > contact.half_angle + 1e-9:
+            inner = side * float(np.min(shared))
+            angle = inner + max(margin, PAST_EDGE) * (base - inner)
+        if _leaves(contact, surface, angle):
+            inside, outside = base, angle
+            while abs(outside - inside) > 1e-12:
+                middle = 0.5 * (inside + outside)
+                inside, outside = (inside, middle) if _leaves(contact, surface, middle) else (middle, outside)
+            angle = inside + max(margin, PAST_EDGE) * (base - inside)
+        forces.append(rotate(angle, contact.normal))
+    return np.stack([forces[0], straight, forces[1]])
+
+
+def _twist(contact: PointContact, surface: LimitSurface, angle: float) -> Array:
+    return surface.twist(contact.wrench(rotate(angle, contact.normal)))
+
+
+def _leaves(contact: PointContact, surface: LimitSurface, angle: float) -> bool:
+    """Whether the contact point moves against the inward normal under a force at an angle from it."""
+    return bool(velocity_at(_twist(contact, surface, angle), contact.point) @ contact.normal <= 0)
 
 
 def straight_force(contact: PointContact, surface: LimitSurface) -> Array:
@@ -38,17 +88,24 @@ def straight_force(contact: PointContact, surface: LimitSurface) -> Array:
     angle = float(contact.force_angles(force))
     miss = abs(angle) - contact.half_angle
     if contact.friction == 0:
-        raise NoDubinsReduction("without friction the contact has one force only, and the object cannot be steered")
+        raise NoDubinsReduction(
+            "without friction the contact has one force only, and the object cannot be steered"
+        )
     if miss >= -1e-9:
         raise NoDubinsReduction(
             f"the friction cone does not strictly contain the force that pushes straight: it lies"
             f" {np.rad2deg(abs(angle)):.1f}° from the normal, the cone's edge {np.rad2deg(contact.half_angle):.1f}°"
-            f" (off by {np.rad2deg(max(miss, 0.0)):.1f}°), so every sticking motion turns the same way."
-            f" More friction than {np.tan(min(abs(angle), 1.55)):.2f} or a contact nearer to the line of the"
-            " normal through the centre of friction would help",
+            f" (off by {np.rad2deg(max(miss, 0.0)):.1f}°), so every sticking motion turns the same way. {_help(angle)}",
             float(np.rad2deg(max(miss, 0.0))),
         )
     return force
+
+
+def _help(angle: float) -> str:
+    contact = "a contact nearer to the line of the normal through the centre of friction would help"
+    if abs(angle) > np.deg2rad(80):
+        return f"No sensible friction would do; {contact}"
+    return f"More friction than {np.tan(abs(angle)):.2f} or {contact}"
 
 
 def _root(contact: PointContact, surface: LimitSurface) -> Array:

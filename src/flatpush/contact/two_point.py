@@ -19,9 +19,9 @@ CLOSED = 1e-9
 def two_point_sticks(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> bool:
     """Whether some wrench of the twist lies in the closed composite cone of the contacts.
 
-    Then the object keeps the body twist (3,) that the hand imposes. Contacts, surface and twist share one frame with its
-    origin at the centre of friction. A rotation about a support point leaves that point's friction free: any of the
-    wrenches will do.
+    Then the object keeps the body twist (3,) that the hand imposes. Contacts, surface and twist share one frame
+    with its origin at the centre of friction. A rotation about a support point leaves that point's friction
+    free: any of the wrenches will do.
     """
     return _inside(contacts, surface.wrench_set(twist))
 

@@ -48,10 +48,10 @@ def dxf_lines(path: str | os.PathLike[str]) -> tuple[list[Array], float | None]:
         # ezdxf raises a plain OSError for a file that is no DXF file.
         reason = (error.strerror or "it is not a drawing in DXF").lower()
         raise InputError(f"the drawing cannot be read ({reason})", source=source, hint=hint) from None
-    except (ezdxf.DXFError, UnicodeDecodeError, ValueError, KeyError, IndexError, TypeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"this is not a drawing in DXF ({error})", source=source, hint=hint) from None
+    except InputError:
+        raise
+    except Exception as error:  # a broken file can make it stumble anywhere
+        raise InputError(f"this is not a drawing in DXF ({error})", source=source, hint=hint) from error
     contours = [contour for contour in contours if len(contour)]
     if not contours:
         return [], None

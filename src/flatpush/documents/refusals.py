@@ -17,13 +17,13 @@ def checked(model: type[Model], document: Any, source: str = "", prefix: str = "
     """The document as a model.
 
     Raises:
-        InputError: for the first thing that is wrong; it tells how many more there are. Unknown keys come
-            first, because a misspelt key is also a missing one.
+        InputError: for the first thing that is wrong; it tells how many more there are. In one mapping an
+            unknown key comes first, because a misspelt key is also a missing one.
     """
     try:
         return model.model_validate(document)
     except ValidationError as failure:
-        errors = sorted(failure.errors(include_url=False), key=lambda e: e["type"] != "unknown_key")
+        errors = failure.errors(include_url=False)
     raise refusal(model, errors, document, source, prefix)
 
 

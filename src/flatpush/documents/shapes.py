@@ -73,10 +73,7 @@ def outer_contour(lines: list[Array], source: str) -> Array:
             hint=_ONE,
         )
     largest = max(closed, key=lambda line: float(np.prod(np.ptp(line, axis=0))))
-    low, high = largest.min(axis=0) - FLATNESS * size, largest.max(axis=0) + FLATNESS * size
-    outside = sum(bool(np.any((line < low) | (line > high))) for line in closed)
-    if not outside and len(closed) > 1:
-        outside = _outside(closed, largest)
+    outside = _outside(closed, largest)
     if outside:
         raise InputError(
             f"the drawing has {outside + 1} outer contours, not one",

@@ -1,13 +1,14 @@
 """Fig. 3: two paths of a square pushed by one finger, by flatness and Dubins curves.
 
-Which two start-goal pairs the paper drew is not recorded. Here: the square of ±20 mm with the pairs (-80 mm, 0, 0) → 0 and
-(0, 0, 0) → (0, 20 mm, 180°), friction 0.3, uniform support, and the ellipsoid model, without margin.
+Which two start-goal pairs the paper drew is not recorded. Here: the square of ±20 mm with the pairs (-80 mm, 0,
+0) → 0 and (0, 0, 0) → (0, 20 mm, 180°), friction 0.3, uniform support, and the ellipsoid model, without margin.
 """
 
 from pathlib import Path
 
 import numpy as np
 
+from ..friction import Ellipsoid
 from ..geometry import Outline
 from ..planning import plan
 from ..problem import Object, Plan, Planning, Push, Pusher, Scene
@@ -47,6 +48,7 @@ def run(folder: Path | None = None) -> str:
         scene = found.scene
         contact = virtual_contact(scene, placement_of(scene, scene.pushes[0]))  # type: ignore[arg-type]
         surface = surface_of(scene.object, "ellipsoid", np.array([0.0, 1.0]))
+        assert isinstance(surface, Ellipsoid)
         flat = flat_output(contact, surface)
 
         def car(pose, flat=flat):  # type: ignore[no-untyped-def]

@@ -1,8 +1,8 @@
 """Where open-loop single-finger plans end in the simulator, for every planning model.
 
-Each case is planned with each model and the default margin and simulated on the exact surface of its support, once from the
-plan's arcs and once straight from sample to sample. Exact plans from arcs must end within 0.05 mm and 0.05°;
-the others show what a model, or a robot's interpolation, costs.
+Each case is planned with each model and the default margin and simulated on the exact surface of its support,
+once from the plan's arcs and once straight from sample to sample. Exact plans from arcs must end within 0.05 mm
+and 0.05°; the others show what a model, or a robot's interpolation, costs.
 """
 
 from pathlib import Path
@@ -49,7 +49,7 @@ def run(folder: Path | None = None) -> str:
                 continue
             ends = []
             for source in ("arcs", "samples"):
-                rollout = simulate(found, source=source)  # type: ignore[arg-type]
+                rollout = simulate(found, source=source)
                 error = pose_error(rollout.final_pose, scene.goal)
                 text = f"{1000 * np.hypot(*error[:2]):9.4f} mm {np.rad2deg(abs(error[2])):7.4f}°"
                 ends.append(text if rollout.outcome == "completed" else rollout.outcome)

@@ -43,7 +43,7 @@ class Support:
 
     @classmethod
     def points(cls, xy: ArrayLike, weights: ArrayLike | None = None) -> "Support":
-        """Feet at the points xy, shape (n, 2) [m]. Only the ratios of their weights (n,) count; default equal.
+        """Feet at the points xy (n, 2) [m]. Only the ratios of their weights (n,) count; default: equal.
 
         Equal points are merged and points of no weight dropped. Warns with CollinearSupportWarning if all
         feet stand on one line, within 1e-9 of the radius.

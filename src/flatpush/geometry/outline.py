@@ -38,8 +38,8 @@ class Outline:
     Build with Outline.polygon or Outline.circle. Edge k runs from corner k to corner k + 1, in the order written.
 
     >>> square = Outline.polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
-    >>> square.area, square.centroid.tolist(), square.nearest((1.0, -0.5)).normal.tolist()
-    (4.0, [1.0, 1.0], [0.0, 1.0])
+    >>> square.area, square.centroid.tolist(), square.nearest((-0.5, 1.0)).normal.tolist()
+    (4.0, [1.0, 1.0], [1.0, 0.0])
     """
 
     vertices: Array  # (n, 2); empty for a circle
@@ -59,14 +59,13 @@ class Outline:
         if not np.all(np.isfinite(points)):
             raise InputError("the corners of an outline are finite numbers", value=vertices)
         extent = float(np.max(np.ptp(points, axis=0))) if len(points) else 0.0
-        kept = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-9 * extent
-        points = points[kept] if extent > 0 else points[:1]
+        points = _different(points, 1e-9 * extent)
         if len(points) < 3:
             raise InputError("an outline has at least three different corners", value=len(points))
         from shapely import Polygon
 
         shape = Polygon(points)
-        if abs(_shoelace(points)) < 1e-9 * extent**2:
+        if shape.convex_hull.area < 1e-9 * extent**2:
             raise InputError("an outline encloses an area", hint="Its corners lie on one line.")
         if not shape.is_valid:
             raise InputError(
@@ -194,6 +193,17 @@ class Outline:
         """The same outline, moved."""
         d = np.asarray(offset, dtype=float)
         return Outline(self.vertices + d, self.centre + d if self.is_circle else self.centre, self.radius)
+
+
+def _different(points: Array, tolerance: float) -> Array:
+    """The corners without those that repeat the one before, or, at the end, the first."""
+    kept: list[Array] = []
+    for point in points:
+        if not kept or np.hypot(*(point - kept[-1])) > tolerance:
+            kept.append(point)
+    while len(kept) > 1 and np.hypot(*(kept[-1] - kept[0])) <= tolerance:
+        kept.pop()
+    return np.array(kept).reshape(-1, 2)
 
 
 def _shoelace(p: Array) -> float:

@@ -19,7 +19,8 @@ class PushDescription:
 
     Attributes:
         push: the push; option: its car under the scene's model, or the refusal.
-        cars: car, or refusal in words, under each model and, as "exact, uniform" and "exact, outline", under the support's
+        cars: car, or refusal in words, under each model and, as "exact, uniform" and "exact, outline", under
+        the support's
             own surface for uniform pressure and for pressure along the outline.
         divergence: L [m]: a small error of one finger grows e-fold per L of travel; nan without a contact.
     """
@@ -59,7 +60,7 @@ def _car(scene: Scene, push: Push, model: Model) -> Car | str:
 
 def _with_support(scene: Scene, word: str) -> Scene:
     """The same object with an assumed pressure and no known surface."""
-    thing = Object(scene.object.outline, word, scene.object.friction, None, scene.object.name)  # type: ignore[arg-type]
+    thing = Object(scene.object.outline, word, scene.object.friction, None, scene.object.name)
     return replace(scene, object=thing)
 
 

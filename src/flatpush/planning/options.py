@@ -23,7 +23,9 @@ class PushOption:
     refusal: str = ""
 
 
-def push_option(scene: Scene, push: Push, model: Model | None = None, margin: float | None = None) -> PushOption:
+def push_option(
+    scene: Scene, push: Push, model: Model | None = None, margin: float | None = None
+) -> PushOption:
     """The car of a push under a model (default: the scene's) with a friction margin (default: the scene's)."""
     placement = None
     try:
@@ -63,5 +65,7 @@ def _check_landing(scene: Scene, placement: Placement) -> None:
     for tip in placement.tips:
         if scene.object.outline.nearest(tip + back).distance < scene.pusher.tip_radius - 1e-9:
             raise InputError(
-                "a finger would land on the object", value=scene.pusher.approach, hint="Use another approach distance."
+                "a finger would land on the object",
+                value=scene.pusher.approach,
+                hint="Use another approach distance.",
             )

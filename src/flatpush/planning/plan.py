@@ -23,8 +23,8 @@ def plan(scene: Scene) -> Plan:
     """The best single push among those listed, or among the automatic candidates.
 
     A start within the goal tolerance is a solved plan without a push. The way is the cheapest of all words of all
-    pushes whose object and fingers keep the clearance; finding a way around obstacles takes more than one push and is not
-    tried.
+    pushes whose object and fingers keep the clearance; finding a way around obstacles takes more than one push
+    and is not tried.
 
     Returns:
         a Plan with its certificate; where there is none, status "no_plan" and the reason of each push.
@@ -44,7 +44,12 @@ def plan(scene: Scene) -> Plan:
     refused = (*refused, *(o for o in options if o.car is None))
     reasons = {o.push.name: o.refusal for o in refused}
     ways = sorted(
-        ((cost, i, k, arcs) for i, o in enumerate(options) if o.car for k, (cost, arcs) in enumerate(_ways(scene, o))),
+        (
+            (cost, i, k, arcs)
+            for i, o in enumerate(options)
+            if o.car
+            for k, (cost, arcs) in enumerate(_ways(scene, o))
+        ),
         key=lambda way: way[:3],
     )
     if not ways:

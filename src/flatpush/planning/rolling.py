@@ -2,8 +2,8 @@
 
 A rolling fingertip moves the contact by tip_radius · Δθ along a straight edge (on a circle of radius R by
 Δθ / (1/R + 1/tip_radius)), so the turning centres move with the object's heading. The word's arcs are
-integrated with the centres of the contact as it then is, and its three parameters solved for by Newton's method from the
-word of the resting contact.
+integrated with the centres of the contact as it then is, and its three parameters solved for by Newton's method
+from the word of the resting contact.
 """
 
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class _Table:
 
     def at(self, turn: str, angle: Array) -> Array:
         x = (2 * np.asarray(angle) - self.low - self.high) / (self.high - self.low)
-        return np.moveaxis(chebyshev.chebval(x, self.series[turn]), 0, -1)
+        return np.moveaxis(np.asarray(chebyshev.chebval(x, self.series[turn]), dtype=float), 0, -1)
 
 
 def rolling_segment(scene: Scene, option: PushOption, arcs: list[ArcGeometry]) -> PushSegment:
@@ -93,7 +93,9 @@ def _tabulate(scene: Scene, option: PushOption, turns: list[str], values: Array)
         rows["left"].append(car.left_centre)
         rows["right"].append(car.right_centre)
         rows["straight"].append(car.direction)
-    series = {key: chebyshev.chebfit(nodes, np.array(value), NODES - 1) for key, value in rows.items()}
+    series = {
+        key: chebyshev.chebfit(nodes, np.array(value), NODES - 1).astype(float) for key, value in rows.items()
+    }
     return _Table(low, high, series)
 
 
@@ -112,13 +114,15 @@ def _move(pose: Array, turn: str, values: Array, heading: float, table: _Table) 
     x, w = np.polynomial.legendre.leggauss(GAUSS)
     s = 0.5 * delta[:, None] * (x + 1)
     speed = rotate(pose[2] + s, perpendicular(-table.at(turn, heading + s)))
-    return np.column_stack([pose[:2] + 0.5 * delta[:, None] * np.einsum("g,ngk->nk", w, speed), pose[2] + delta])
+    return np.column_stack(
+        [pose[:2] + 0.5 * delta[:, None] * np.einsum("g,ngk->nk", w, speed), pose[2] + delta]
+    )
 
 
 def _end(start: Array, turns: list[str], values: Array, table: _Table) -> Array:
     pose = start
     for turn, value in zip(turns, values, strict=True):
-        pose = _move(pose, turn, float(value), float(pose[2] - start[2]), table)[0]
+        pose = _move(pose, turn, np.array([value]), float(pose[2] - start[2]), table)[0]
     return pose
 
 
@@ -165,7 +169,8 @@ def _timed(scene: Scene, option: PushOption, turns: list[str], values: Array, ta
         law = Trapezoid.along(length, radius, SLOWER * pusher.speed, SLOWER * pusher.acceleration)
         far = outline.radius_about((0.0, 0.0)) + (0.0 if turn == "straight" else radius)
         t, fraction = law.samples(
-            min(np.sqrt(8 * SAG / pusher.acceleration), np.sqrt(8 * SAG_ANGLE * radius / pusher.acceleration)) / 2,
+            min(np.sqrt(8 * SAG / pusher.acceleration), np.sqrt(8 * SAG_ANGLE * radius / pusher.acceleration))
+            / 2,
             1 if turn == "straight" else 3 * int(np.ceil(value / np.sqrt(8 * SAG / far))) + 1,
         )
         at = np.interp(fraction * length, lengths, grid)

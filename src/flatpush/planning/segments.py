@@ -70,7 +70,9 @@ def push_segment(
         poses.append(compose(X, exp(fraction[1:, None] * arc.step)))
         X = compose(X, exp(arc.step))
         clock += law.duration
-        reach_E = float(np.hypot(*(car.pusher[:2] - _centre(arc.step)))) * turn if turn > 0 else arc.flat_length
+        reach_E = (
+            float(np.hypot(*(car.pusher[:2] - _centre(arc.step)))) * turn if turn > 0 else arc.flat_length
+        )
         value = {"flat": arc.flat_length, "pusher": reach_E, "time": law.duration}[cost]
         made.append(Arc(arc.turn, arc.step / law.duration, law.duration, value))  # type: ignore[arg-type]
     all_poses = np.concatenate(poses)
@@ -86,7 +88,7 @@ def fingertips(push_fingers: int, spacing: float) -> Array:
 
 
 def landing(pusher: Pusher, contact_pose: Array, leaving: bool = False) -> TransitSegment:
-    """From above (or from beside, with planar transits) onto the contact, straight along the push direction; or back."""
+    """From above (planar transits: from beside) onto the contact, straight along the push direction; or back."""
     away = compose(contact_pose, [-pusher.approach, 0.0, 0.0])
     ways = [(away, contact_pose, 0.0, 0.0, pusher.approach)]
     if pusher.transit == "lift":

@@ -41,7 +41,9 @@ class Trapezoid:
         t = np.clip(time, 0.0, T)
         left = T - t
         cruising = 0.5 * a * r * r + a * r * (t - r)
-        return np.where(t < r, 0.5 * a * t * t, np.where(left < r, self.length - 0.5 * a * left * left, cruising))
+        return np.where(
+            t < r, 0.5 * a * t * t, np.where(left < r, self.length - 0.5 * a * left * left, cruising)
+        )
 
     def samples(self, step: float, count: int) -> tuple[Array, Array]:
         """Times and fractions of the length: at most `step` seconds apart in the ramps, at least `count` pieces in all.

@@ -5,10 +5,19 @@ from functools import lru_cache
 import numpy as np
 
 from ..contact import Placement, PointContact, place_fingers
+from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, fit_surface, local_ellipsoid
 from ..geometry import OutlinePoint
 from ..geometry.pose import Array
 from .scene import Model, Object, Push, Scene
+
+
+def named(scene: Scene, name: str) -> Push:
+    """The push of a scene that has a name."""
+    for push in scene.pushes:
+        if isinstance(push, Push) and push.name == name:
+            return push
+    raise FlatpushError(f"the plan uses a push {name!r} that its scene does not list")
 
 
 def placement_of(scene: Scene, push: Push) -> Placement:

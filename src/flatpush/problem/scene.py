@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..friction.surface import LimitSurface
 from ..friction.support import Support
+from ..friction.surface import LimitSurface
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 
@@ -30,11 +30,22 @@ class Object:
     """
 
     outline: Outline
-    support: Support = "uniform"  # type: ignore[assignment]  # the two words are replaced below
+    support: Support = field(default="uniform")  # type: ignore[assignment]  # words are replaced below
     friction: float = 0.3
     surface: LimitSurface | None = None
     name: str = "object"
     support_word: str = field(default="", init=False)  # "uniform" or "outline" where one was given
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            outline: Outline | ArrayLike,
+            support: Support | str = "uniform",
+            friction: float = 0.3,
+            surface: LimitSurface | None = None,
+            name: str = "object",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if not isinstance(self.outline, Outline):

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from ..contact import Placement, PointContact, composite_margin, straight_force
-from ..errors import FlatpushError
+from ..contact import Placement, PointContact, composite_margin, steering_forces
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, pose_error, relative, rotate, shift_twist, transform, velocity_at
 from ..geometry.pose import Array
-from ..problem import Push, PushSegment, Scene, TransitSegment
+from ..problem import PushSegment, Scene, TransitSegment
 from ..problem.mechanics import (
     contact_at,
     contacts_of,
     divergence_length,
+    named,
     placement_of,
     surface_of,
     true_surface,
@@ -25,6 +25,7 @@ from .pieces import pieces, progress, turns_along
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
 TRUSTED_GROWTH = float(np.exp(4.0))
+CONE_SAMPLES = 33
 
 
 def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> dict[str, Any]:
@@ -35,8 +36,10 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
         friction_margin: worst over all twists, and over all forces consistent with each: the fraction of μ that can be
             lost before the contact slips, under the planning model (two fingers in the middle: the virtual contact).
         friction_margin_degrees: the same as an angle between force and cone edge.
-        motion_cone_margin_degrees: angle between the pusher's velocity and the nearer motion-cone edge.
-        curvature_margin: 1 - turn per travel of the contact / the most that the whole friction cone allows.
+        motion_cone_margin_degrees: angle between the pusher's velocity and the nearer motion-cone edge, or the
+        outline's
+            tangent, beyond which the fingertip leaves.
+        curvature_margin: 1 - turn per travel of the contact / the most among forces of the whole friction cone.
         composite_margin: two fingers: the fraction of μ that can be lost before a twist leaves the true composite
             cone of both contacts, under the believed surface; null with one finger.
         model_offset: how far the believed surface's line of force passes from the contact, at worst [m]: 0 when the
@@ -52,7 +55,7 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
     cars: dict[str, Any] = {}
     cost, growth, previous = 0.0, None, None
     for segment in pushes:
-        placement = placement_of(scene, _named(scene, segment.push))
+        placement = placement_of(scene, named(scene, segment.push))
         contact = virtual_contact(scene, placement)
         surface = surface_of(scene.object, scene.planning.model, -contact.point / np.hypot(*contact.point))
         cars.setdefault(segment.push, _centres(scene, contact, surface))
@@ -94,20 +97,15 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
     return certificate
 
 
-def _named(scene: Scene, name: str) -> Push:
-    for push in scene.pushes:
-        if isinstance(push, Push) and push.name == name:
-            return push
-    raise FlatpushError(f"the plan uses a push {name!r} that its scene does not list")
-
-
 def _twists(scene: Scene, segment: PushSegment, contact: PointContact) -> list[tuple[Array, PointContact]]:
     """The body twists of a push, about the COF, each with the contact at which it happens.
 
     Where the pusher keeps its direction the contact rolls along, and every step between samples is a twist.
     """
     if turns_along(segment):
-        return [(shift_twist(arc.twist, scene.object.cof), contact) for arc in segment.arcs if arc.duration > 0]
+        return [
+            (shift_twist(arc.twist, scene.object.cof), contact) for arc in segment.arcs if arc.duration > 0
+        ]
     found = []
     for i in range(len(segment.times) - 1):
         V = log(relative(segment.object[i], segment.object[i + 1]))
@@ -129,9 +127,10 @@ def _margins(
     mu = contact.friction
     u = velocity_at(twist, contact.point)
     left, right = contact.motion_cone(surface)
-    motion = min(_angle(right, u), _angle(u, left))
+    lean = abs(float(contact.force_angles(u)))
+    motion = min(_angle(right, u), _angle(u, left), 0.5 * np.pi - lean)
     margins = {
-        "friction": 1 - float(np.tan(min(angle, 1.57))) / mu if mu > 0 else -np.inf,
+        "friction": 1 - float(np.tan(min(angle, 1.57))) / mu if mu > 0 else -9.0,
         "degrees": float(np.rad2deg(contact.half_angle - angle)),
         "motion": float(np.rad2deg(motion)),
         "curvature": _curvature_margin(surface, contact, twist),
@@ -148,26 +147,26 @@ def _margins(
 
 
 def _curvature_margin(surface: LimitSurface, contact: PointContact, twist: Array) -> float:
+    """Turn per travel of the contact, against the most that forces in the whole cone make on the same side.
+
+    The most need not be at the cone's edge, so the cone is sampled.
+    """
     if twist[2] == 0:
         return 1.0
-    edge = contact.force_edges()[1 if twist[2] > 0 else 0]
-    V = surface.twist(contact.wrench(edge))
-
-    def turn(V: Array) -> float:
-        return abs(float(V[2])) / float(np.hypot(*velocity_at(V, contact.point)))
-
-    return 1 - turn(twist) / turn(V) if V[2] * twist[2] > 0 else -np.inf
+    angles = np.linspace(-contact.half_angle, contact.half_angle, CONE_SAMPLES)
+    V = np.array([surface.twist(contact.wrench(rotate(angle, contact.normal))) for angle in angles])
+    turns = V[:, 2] / np.linalg.norm(velocity_at(V, contact.point), axis=1)
+    turn = float(twist[2]) / float(np.hypot(*velocity_at(twist, contact.point)))
+    most = float(np.max(turns) if turn > 0 else np.min(turns))
+    return 1 - turn / most if most * turn > 0 else -9.0
 
 
 def _centres(scene: Scene, contact: PointContact, surface: LimitSurface) -> dict[str, list[float]]:
     """Turning centres of the margin-shrunk friction cone, and the straight direction, in O."""
-    straight = straight_force(contact, surface)
-    base = float(contact.force_angles(straight))
+    left, straight, right = steering_forces(contact, surface, scene.planning.friction_margin)
     centres = []
-    for edge in contact.force_edges():
-        angle = float(contact.force_angles(edge))
-        angle += scene.planning.friction_margin * (base - angle)
-        V = surface.twist(contact.wrench(rotate(angle, contact.normal)))
+    for force in (left, right):
+        V = surface.twist(contact.wrench(force))
         centres.append(np.array([-V[1], V[0]]) / V[2] + scene.object.cof)
     v = surface.twist(contact.wrench(straight))[:2]
     names = {"left_centre": centres[1], "right_centre": centres[0], "straight": v / np.hypot(*v)}
@@ -206,11 +205,13 @@ def _warnings(certificate: dict[str, Any]) -> list[str]:
     growth = certificate["growth"]
     if growth is not None and growth > TRUSTED_GROWTH:
         found.append(
-            f"one finger: a small error grows {growth:.0f}-fold on the way; this push cannot be trusted without"
+            f"one finger: a small error grows {growth:.3g}-fold on the way; this push cannot be trusted without"
             " feedback. Push with two fingers, or from nearer"
         )
     elif growth is not None and growth > 10:
-        found.append(f"one finger: a small error grows {growth:.0f}-fold on the way; land precisely or use feedback")
+        found.append(
+            f"one finger: a small error grows {growth:.0f}-fold on the way; land precisely or use feedback"
+        )
     composite = certificate["composite_margin"]
     if composite is not None and composite < 0:
         found.append(
@@ -243,7 +244,7 @@ def sample_errors(scene: Scene, segments: Sequence[PushSegment | TransitSegment]
     limits = scene.pusher
     for segment in segments:
         if isinstance(segment, PushSegment):
-            placement = placement_of(scene, _named(scene, segment.push))
+            placement = placement_of(scene, named(scene, segment.push))
             errors["start"] = max(errors["start"], _most(segment.object[0], pose))
             tips = transform(placement.pose, segment.fingers)
             errors["fingers"] = max(errors["fingers"], float(np.max(np.abs(tips - placement.tips))))

@@ -18,9 +18,9 @@ RESOLUTION = 1e-6
 def clearance_of(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> float | None:
     """The least distance [m] of object and fingertips to obstacles and bounds over a whole plan; None without either.
 
-    Negative where something overlaps or leaves the bounds. No motion between samples is missed: a piece in which nothing
-    moves further than m cannot come nearer than its ends' distances less m/2, and is halved until that settles it.
-    A lifted pusher is free of obstacles, not of bounds.
+    Negative where something overlaps or leaves the bounds. No motion between samples is missed: a piece in
+    which nothing moves further than m cannot come nearer than its ends' distances less m/2, and is halved until
+    that settles it. A lifted pusher is free of obstacles, not of bounds.
     """
     if scene.workspace.bounds is None and not scene.workspace.obstacles:
         return None

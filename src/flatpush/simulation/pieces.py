@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -75,7 +76,15 @@ def pieces(
                 step = pose_error(segment.pusher[i + 1], segment.pusher[i])
                 lifted = bool(max(segment.height[i], segment.height[i + 1]) > 0)
                 yield Piece(
-                    clock + t[i], t[i + 1] - t[i], resting, np.zeros(3), segment.pusher[i], step, False, None, lifted
+                    clock + t[i],
+                    t[i + 1] - t[i],
+                    resting,
+                    np.zeros(3),
+                    segment.pusher[i],
+                    step,
+                    False,
+                    None,
+                    lifted,
                 )
         else:
             push += 1
@@ -83,7 +92,15 @@ def pieces(
             make = _from_arcs if exact else _from_samples
             for i, (object_, object_step, pusher, pusher_step) in enumerate(make(segment)):
                 yield Piece(
-                    clock + t[i], t[i + 1] - t[i], object_, object_step, pusher, pusher_step, exact, push, False
+                    clock + t[i],
+                    t[i + 1] - t[i],
+                    object_,
+                    object_step,
+                    pusher,
+                    pusher_step,
+                    exact,
+                    push,
+                    False,
                 )
             resting = segment.object[-1]
         clock += float(t[-1]) if len(t) else 0.0
@@ -107,12 +124,11 @@ def _from_samples(segment: PushSegment) -> Iterator[tuple[Array, Array, Array, A
 
 def _from_arcs(segment: PushSegment) -> Iterator[tuple[Array, Array, Array, Array]]:
     X_OE = relative(segment.object[0], segment.pusher[0])
-    for i, (arc, low, high) in enumerate(progress(segment)):
+    for arc, low, high in progress(segment):
         X = arc_pose(segment, arc, low)
         twist = segment.arcs[arc].twist * segment.arcs[arc].duration
         step = (high - low) * twist
         yield X, step, compose(X, X_OE), _in_frame(step, X_OE)
-    assert i == len(segment.times) - 2
 
 
 def arc_pose(segment: PushSegment, arc: int, fraction: float) -> Array:
@@ -137,7 +153,7 @@ def progress(segment: PushSegment) -> list[tuple[int, float, float]]:
         else:
             travelled = np.linalg.norm(segment.object[i : j + 1, :2] - segment.object[i, :2], axis=1)
         fractions = travelled / travelled[-1] if travelled[-1] != 0 else np.linspace(0, 1, j - i + 1)
-        found += [(k, float(a), float(b)) for a, b in zip(fractions[:-1], fractions[1:], strict=True)]
+        found += [(k, float(a), float(b)) for a, b in pairwise(fractions)]
     return found
 
 

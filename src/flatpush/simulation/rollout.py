@@ -11,7 +11,7 @@ from ..friction.surface import LimitSurface
 from ..geometry import compose, inverse, perpendicular, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
 from ..problem import Object, Plan, Rollout, Scene
-from ..problem.mechanics import contacts_of, placement_of, surface_of, virtual_contact
+from ..problem.mechanics import contacts_of, named, placement_of, surface_of, virtual_contact
 from ..problem.scene import Model
 from .pieces import Piece, Source, pieces
 
@@ -132,7 +132,7 @@ class _Run:
 
     def _prepare(self, index: int) -> None:
         """Fingers, contacts and limit surface of a push."""
-        push = next(p for p in self.scene.pushes if p.name == self.plan.pushes[index].push)  # type: ignore[union-attr]
+        push = named(self.scene, self.plan.pushes[index].push)
         placement = placement_of(self.scene, push)
         p = virtual_contact(self.scene, placement).point
         self.fingers = push.fingers
@@ -160,7 +160,10 @@ class _Run:
 
     def _press(self, piece: Piece) -> ContactMode:
         """One finger: classical Runge-Kutta steps while it touches, a search for the touch while it does not."""
-        travel = float(np.hypot(*piece.pusher_step[:2])) + abs(piece.pusher_step[2]) * self.scene.object.outline.size
+        travel = (
+            float(np.hypot(*piece.pusher_step[:2]))
+            + abs(piece.pusher_step[2]) * self.scene.object.outline.size
+        )
         n = max(1, int(np.ceil(travel / STEP)))
         mode = ContactMode.REST
         for i in range(n):

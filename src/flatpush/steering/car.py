@@ -1,11 +1,11 @@
-"""The car that a sticking push makes of an object: turn left about one point, turn right about another, or go straight."""
+"""The car that a sticking push makes of an object: left about one point, right about another, or straight on."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact import PointContact, straight_force
+from ..contact import PointContact, steering_forces
 from ..errors import InputError, NoDubinsReduction
 from ..friction.surface import LimitSurface
 from ..geometry import cross, rotate, shift_twist, velocity_at
@@ -53,20 +53,20 @@ class Car:
         """The car of a contact under a limit surface.
 
         Args:
-            margin: fraction of the angle by which each edge of the friction cone is moved towards the straight force.
+            margin: fraction of the angle by which each edge of the friction cone is moved towards the straight force
+                (see contact.steering_forces).
 
         Raises:
             NoDubinsReduction: if the push cannot turn both ways (docs/errata.md row 9).
         """
-        if not 0 <= margin < 1:
-            raise InputError("the friction margin is at least 0 and less than 1", value=margin)
-        straight = straight_force(contact, surface)
-        left, right = (_towards(edge, straight, margin) for edge in contact.force_edges())
+        left, straight, right = forces = steering_forces(contact, surface, margin)
         centres = []
         for force, sign in ((right, 1.0), (left, -1.0)):
             V = surface.twist(contact.wrench(force))
             if sign * V[2] <= 0:
-                raise NoDubinsReduction("an edge of the friction cone does not turn the object the way it should")
+                raise NoDubinsReduction(
+                    "an edge of the friction cone does not turn the object the way it should"
+                )
             centres.append(np.array([-V[1], V[0]]) / V[2])
         v = surface.twist(contact.wrench(straight))[:2]
         direction = v / np.hypot(*v)
@@ -80,7 +80,7 @@ class Car:
             np.asarray(pusher, dtype=float),
             contact,
             surface,
-            np.stack([left, straight, right]),
+            forces,
             offset,
         )
 
@@ -147,11 +147,6 @@ class Car:
             1.0,
             float(np.hypot(*(point - self.right_centre))),
         )
-
-
-def _towards(edge: Array, straight: Array, fraction: float) -> Array:
-    angle = np.arctan2(cross(edge, straight), edge @ straight)
-    return rotate(fraction * angle, edge)
 
 
 def _about(centre: Array, omega: float) -> Array:

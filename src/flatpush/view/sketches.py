@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..friction import Ellipsoid
 from ..geometry import rotate
 from ..geometry.pose import Array
 from ..planning import PushDescription
@@ -48,7 +49,7 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
         flat_point=nothing if car is None else car.flat_point,
         straight=nothing if car is None else car.direction,
         refusal=option.refusal,
-        centres=np.empty((0, 2)) if car is None or car.is_dubins else _centres(car),
+        centres=np.empty((0, 2)) if car is None or isinstance(surface, Ellipsoid) else _centres(car),
     )
 
 

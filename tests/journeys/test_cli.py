@@ -1,0 +1,220 @@
+"""The command line, as a user meets it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.yaml"))
+SCENE = """
+flatpush: scene/1
+units: {length: mm, angle: deg}
+object: {outline: [[25, -17.5], [25, 17.5], [-25, 17.5], [-25, -17.5]], support: outline, friction: 0.3}
+pusher: {fingers: 2, spacing: 18, tip_radius: 2.5}
+start: [20, -50, 15]
+goal: [0, 0, 0]
+"""
+
+
+def flatpush(*arguments, folder, **options) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "flatpush", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, **options)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+def test_plan_verify_simulate_export(folder):
+    made = flatpush("plan", "scene.yaml", "-o", "plan.json", folder=folder)
+    assert made.returncode == 0, made.stderr
+    assert "certificate" in made.stdout
+    verified = flatpush("verify", "plan.json", folder=folder)
+    assert verified.returncode == 0
+    assert "verified" in verified.stdout
+    simulated = flatpush("simulate", "plan.json", "--json", folder=folder)
+    result = json.loads(simulated.stdout)["runs"][0]
+    assert result["outcome"] == "completed"
+    assert result["distance"] < 1e-6
+    exported = flatpush("export", "plan.json", "robot.csv", "--base-frame", "0.3,0,0.1,0", folder=folder)
+    assert exported.returncode == 0
+    lines = (folder / "robot.csv").read_text().splitlines()
+    assert "[m]" in lines[0]
+    assert "[rad]" in lines[0]
+    document = json.loads((folder / "plan.json").read_text())
+    junctions = len(document["segments"]) - 1  # two segments share a pose there
+    assert len(lines) - 1 == sum(len(s["times"]) for s in document["segments"]) - junctions
+
+
+def test_an_edited_plan_fails_verification(folder):
+    flatpush("plan", "scene.yaml", "-o", "plan.json", folder=folder)
+    document = json.loads((folder / "plan.json").read_text())
+    document["cost"] *= 0.99
+    (folder / "plan.json").write_text(json.dumps(document))
+    verified = flatpush("verify", "plan.json", folder=folder)
+    assert verified.returncode == 4
+    assert "cost" in verified.stderr
+
+
+def test_json_output_is_the_plan_document(folder):
+    made = flatpush("plan", "scene.yaml", "--json", "--goal", "5,0,0", "--model", "ellipsoid", folder=folder)
+    document = json.loads(made.stdout)
+    assert document["flatpush"] == "plan/1"
+    assert document["scene"]["goal"] == [0.005, 0.0, 0.0]
+    assert document["scene"]["planning"]["model"] == "ellipsoid"
+
+
+def test_perturbed_runs_report_a_distribution(folder):
+    (folder / "one.yaml").write_text(SCENE.replace("fingers: 2, spacing: 18, ", ""))
+    flatpush("plan", "one.yaml", "-o", "plan.json", folder=folder)
+    runs = flatpush("simulate", "plan.json", "--runs", "3", "--seed", "7", "-o", "runs.json", folder=folder)
+    assert runs.returncode == 0, runs.stderr
+    assert "3 runs" in runs.stdout
+    assert (folder / "runs.json").exists()
+    again = flatpush("simulate", "plan.json", "--runs", "3", "--seed", "7", folder=folder)
+    assert again.stdout.splitlines()[:2] == runs.stdout.splitlines()[:2]
+
+
+def test_describe_tells_why_a_push_cannot_steer(folder):
+    scene = SCENE + "pushes: [{name: left end, edge: 2, along: 0.75}, {name: corner, edge: 0, along: 0.8}]\n"
+    (folder / "scene.yaml").write_text(scene.replace("fingers: 2, spacing: 18, ", ""))
+    described = flatpush("describe", "scene.yaml", "--figure", "cones.svg", folder=folder)
+    assert described.returncode == 0, described.stderr
+    assert "cannot steer" in described.stdout
+    assert "turning radius" in described.stdout
+    assert "exact, uniform" in described.stdout
+    assert (folder / "cones.svg").read_text().startswith("<?xml")
+
+
+def test_init_writes_a_scene_that_plans_and_never_overwrites(folder):
+    assert flatpush("init", "new.yaml", folder=folder).returncode == 0
+    assert flatpush("plan", "new.yaml", folder=folder).returncode == 0
+    again = flatpush("init", "new.yaml", folder=folder)
+    assert again.returncode == 2
+    assert "not overwritten" in again.stderr
+
+
+def test_no_friction_is_no_plan(folder):
+    (folder / "scene.yaml").write_text(SCENE.replace("friction: 0.3", "friction: 0"))
+    made = flatpush("plan", "scene.yaml", "-o", "plan.json", folder=folder)
+    assert made.returncode == 3
+    assert "without friction" in made.stderr
+    assert not (folder / "plan.json").exists()
+
+
+def test_already_there_is_an_empty_plan(folder):
+    made = flatpush("plan", "scene.yaml", "--start", "0,0,360", "-o", "plan.json", folder=folder)
+    assert made.returncode == 0, made.stderr
+    assert json.loads((folder / "plan.json").read_text())["segments"] == []
+    assert flatpush("verify", "plan.json", folder=folder).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plan", "missing.yaml"), "missing.yaml"),
+        (("plan", "."), "folder|directory"),
+        (("plan", "scene.yaml", "--start", "1,2"), "3 numbers"),
+        (("plan", "scene.yaml", "--start", "1,2,nan"), "3 numbers"),
+        (("plan", "scene.yaml", "--model", "magic"), "model"),
+        (("plan", "scene.yaml", "--figure", "plan.bmp"), "svg"),
+        (("plan", "scene.yaml", "-o", "nowhere/plan.json"), "nowhere"),
+        (("plan",), "Missing argument|SCENE"),
+        (("paln",), "paln"),
+        (("verify", "scene.yaml"), "plan"),
+        (("simulate", "scene.yaml"), "plan"),
+        (("simulate", "scene.yaml", "--runs", "0"), "at least 1"),
+        (("export", "scene.yaml", "robot.txt"), "csv"),
+        (("experiment", "fig99"), "no such experiment"),
+    ],
+)
+def test_bad_usage_is_one_message_and_status_2(folder, arguments, words):
+    import re
+
+    ended = flatpush(*arguments, folder=folder)
+    assert ended.returncode == 2
+    assert re.search(words, ended.stderr)
+    assert "Traceback" not in ended.stderr
+    assert sorted(p.name for p in folder.iterdir()) == ["scene.yaml"]
+
+
+def test_a_full_disk_leaves_no_file(folder):
+    """A device that is always full stands for the disk."""
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full on this system")
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000));"
+    code = limit + "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+    code += "import sys; sys.argv = ['flatpush', 'plan', 'scene.yaml', '-o', 'plan.json'];"
+    code += "from flatpush.cli import main; main()"
+    ended = subprocess.run(
+        [sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, text=True, timeout=120
+    )
+    assert ended.returncode == 2, ended.stderr
+    assert "plan.json" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert sorted(p.name for p in folder.iterdir()) == ["scene.yaml"]
+
+
+def test_interrupting_leaves_no_file(folder):
+    (folder / "one.yaml").write_text(SCENE.replace("fingers: 2, spacing: 18, ", ""))
+    flatpush("plan", "one.yaml", "-o", "plan.json", folder=folder)
+    before = sorted(p.name for p in folder.iterdir())
+    command = [sys.executable, "-m", "flatpush", "simulate", "plan.json", "--runs", "500", "-o", "runs.json"]
+    running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    time.sleep(3)
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert "Traceback" not in errors
+    assert sorted(p.name for p in folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_every_example_plans_and_verifies(example, tmp_path):
+    made = flatpush("plan", example, "-o", "plan.json", folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert flatpush("verify", "plan.json", folder=tmp_path).returncode == 0
+
+
+def test_help_and_version(tmp_path):
+    shown = flatpush("--help", folder=tmp_path)
+    for command in ("plan", "verify", "simulate", "describe", "export", "init", "experiment"):
+        assert command in shown.stdout
+    assert "flatpush 0.1.0" in flatpush("--version", folder=tmp_path).stdout
+
+
+def test_help_loads_nothing_heavy(tmp_path):
+    code = (
+        "import sys; sys.argv = ['flatpush', '--help']\n"
+        "from flatpush.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'numba', 'pydantic', 'yaml', 'matplotlib', 'shapely', 'clarabel'}\n"
+        "sys.exit(sorted(heavy & set(sys.modules)) or None)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_a_plan_loads_no_compiler(folder):
+    code = (
+        "import sys; sys.argv = ['flatpush', 'plan', 'scene.yaml']\n"
+        "from flatpush.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "sys.exit(sorted({'numba', 'matplotlib', 'clarabel', 'scipy.optimize'} & set(sys.modules)) or None)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == 0, ended.stderr
