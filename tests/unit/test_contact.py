@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from flatpush.contact import PointContact, composite_margin, place_fingers, straight_force, two_point_sticks
+from flatpush.contact import (
+    PointContact,
+    composite_margin,
+    place_fingers,
+    steering_forces,
+    straight_force,
+    two_point_sticks,
+)
+from flatpush.contact.placement import travel
 from flatpush.errors import InputError, NoDubinsReduction
-from flatpush.friction import Ellipsoid, Exact, Support
+from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Support
 from flatpush.geometry import Outline, perpendicular, rotate, velocity_at
 
 ISOTROPIC = Ellipsoid(np.diag([1.0, 1.0, 4.0]))
@@ -116,6 +124,33 @@ def test_a_push_that_cannot_steer_says_by_how_many_degrees():
     with pytest.raises(NoDubinsReduction, match=r"off by 9\.9°") as caught:
         straight_force(contact, ISOTROPIC)
     assert caught.value.degrees == pytest.approx(np.rad2deg(np.arctan(0.5) - np.arctan(0.3)))
+
+
+def test_collinear_feet_are_not_steered_by_a_push_square_to_their_line():
+    with pytest.warns(CollinearSupportWarning):
+        support = Support.points([(-0.02, 0.0), (0.02, 0.0)], [1, 1])
+    surface = Exact(support)
+    with pytest.raises(NoDubinsReduction, match="many motions"):
+        steering_forces(PointContact([0.0, -0.02], [0.0, 1.0], 0.3), surface, 0.1)
+    along = PointContact([-0.03, 0.0], [1.0, 0.0], 0.3)
+    assert steering_forces(along, surface, 0.1)[1] == pytest.approx([1.0, 0.0])
+
+
+@pytest.mark.parametrize("edge", ["left", "right", "above", "below"])
+def test_two_fingers_fit_the_recorded_butterfly(data_folder, edge):
+    """The authors' outline has concave sides; both tips must touch it there, square to the symmetric waist."""
+    recorded = np.loadtxt(data_folder / "plan_graph" / "shape_butterfly.csv", delimiter=",", skiprows=1)
+    outline = Outline.polygon(recorded)
+    towards = {"left": (1, 0), "right": (-1, 0), "above": (0, -1), "below": (0, 1)}[edge]
+    _, middle = travel(outline, -0.05 * np.array(towards), np.array(towards, dtype=float), 0.0)
+    at = outline.nearest(middle + [1e-6, 1e-6])  # not exactly at one of its many corners
+    placement = place_fingers(outline, at, 2, 0.018, 0.0025)
+    for tip, point in zip(placement.tips, placement.points, strict=True):
+        assert outline.nearest(tip).distance == pytest.approx(0.0025, abs=1e-9)
+        assert outline.nearest(point).distance == pytest.approx(0, abs=1e-9)
+    assert placement.virtual_normal @ towards > 0.99
+    # Both stand inside the side's hollow: nearer to the middle than the object's own half extent.
+    assert np.all(-placement.tips @ towards < np.max(recorded @ -np.array(towards)) + 0.0025 + 1e-9)
 
 
 def test_two_fingers_carry_what_one_cannot():

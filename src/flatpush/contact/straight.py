@@ -26,7 +26,7 @@ def steering_forces(contact: PointContact, surface: LimitSurface, margin: float)
 
     Raises:
         InputError: if the margin is not in [0, 1).
-        NoDubinsReduction: as straight_force.
+        NoDubinsReduction: as straight_force, and where one of the forces has many twists.
     """
     if not 0 <= margin < 1:
         raise InputError("the friction margin is at least 0 and less than 1", value=margin)
@@ -49,7 +49,13 @@ def steering_forces(contact: PointContact, surface: LimitSurface, margin: float)
                 inside, outside = (inside, middle) if _leaves(contact, surface, middle) else (middle, outside)
             angle = inside + max(margin, PAST_EDGE) * (base - inside)
         forces.append(rotate(angle, contact.normal))
-    return np.stack([forces[0], straight, forces[1]])
+    steering = np.stack([forces[0], straight, forces[1]])
+    if any(surface.is_vertex(contact.wrench(force)) for force in steering):
+        raise NoDubinsReduction(
+            "the support points lie on one line and a force of this push is square to it: many motions go with that"
+            " force (a vertex of the limit surface), so it cannot steer. Push at another place"
+        )
+    return steering
 
 
 def _twist(contact: PointContact, surface: LimitSurface, angle: float) -> Array:

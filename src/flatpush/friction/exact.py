@@ -59,6 +59,12 @@ class Exact(LimitSurface):
         V = np.array([self._twist(f) for f in flat])
         return self._about_origin(V).reshape(F.shape)
 
+    def is_vertex(self, wrench: ArrayLike) -> bool:
+        """Whether a wrench (3,) has many twists, as collinear feet have for a push square to their line."""
+        F, c = np.array(_vectors(wrench, "a wrench")), self.support.centre
+        F[2] = (F[2] - c[0] * F[1] + c[1] * F[0]) / self._length
+        return bool(np.any(F)) and self._vertex(F / np.sqrt(F @ F)) is not None
+
     def wrench(self, twist: ArrayLike) -> Array:
         """The Coulomb wrench at friction = load = 1, shape (..., 3); see Support.wrench."""
         return self.support.wrench(twist)
@@ -135,13 +141,21 @@ class Exact(LimitSurface):
         out[..., 1] -= c[0] * out[..., 2]
         return out
 
-    def _twist(self, F: Array) -> Array:
-        F = F / np.sqrt(F @ F)
+    def _vertex(self, F: Array) -> Array | None:
+        """The middle twist of the vertex that a unit wrench points at, in units; None elsewhere."""
         if isinstance(self._unit, Feet):
             for W, V in zip(*self._vertices, strict=True):
                 away = np.cross(F, W / np.sqrt(W @ W))
                 if away @ away <= ON_LINE**2:
-                    return V * (np.sign(F @ W) / np.sqrt(V @ V))
+                    return np.asarray(V * (np.sign(F @ W) / np.sqrt(V @ V)))
+        return None
+
+    def _twist(self, F: Array) -> Array:
+        F = F / np.sqrt(F @ F)
+        vertex = self._vertex(F)
+        if vertex is not None:
+            return vertex
+        if isinstance(self._unit, Feet):
             _, weights, turns, wrenches, h = self._facets
             power = turns @ F
             with np.errstate(divide="ignore", invalid="ignore"):

@@ -47,6 +47,10 @@ class LimitSurface(ABC):
         """All wrenches with H = 1 of one twist of shape (3,)."""
         return WrenchSet(self.wrench(twist), np.zeros(2), 0.0)
 
+    def is_vertex(self, wrench: ArrayLike) -> bool:
+        """Whether a wrench of shape (3,) has many twists, so that a force alone does not determine the motion."""
+        return False
+
     @abstractmethod
     def stick(self, point: ArrayLike, velocity: ArrayLike) -> Array:
         """The twist of the body whose point (2,) is held to the velocity (2,) by a force through it.

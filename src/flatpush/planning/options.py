@@ -35,11 +35,6 @@ def push_option(
         distance = float(np.hypot(*contact.point))
         towards = -contact.point / distance if distance > 0 else contact.normal
         surface = surface_of(scene.object, model or scene.planning.model, towards)
-        if getattr(scene.object.support, "collinear", False) and scene.object.surface is None:
-            raise FlatpushError(
-                "all support points lie on one line: a straight push does not determine the motion (its force meets"
-                " a vertex of the limit surface), so the object cannot be steered"
-            )
         car = Car.of(
             contact,
             surface,
