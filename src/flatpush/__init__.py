@@ -34,6 +34,7 @@ _NAMES = {
     "Outline": "geometry",
     "Perturbation": "simulation",
     "Plan": "problem",
+    "Planner": "planning",
     "Planning": "problem",
     "PointContact": "contact",
     "Push": "problem",
@@ -74,6 +75,7 @@ __all__ = [
     "Outline",
     "Perturbation",
     "Plan",
+    "Planner",
     "Planning",
     "PointContact",
     "Push",
@@ -113,7 +115,7 @@ if TYPE_CHECKING:
         fit_quartic,
     )
     from .geometry import Outline
-    from .planning import describe, plan
+    from .planning import Planner, describe, plan
     from .problem import (
         Arc,
         Certificate,

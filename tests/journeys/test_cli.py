@@ -206,7 +206,8 @@ def test_help_loads_nothing_heavy(tmp_path):
     assert ended.returncode == 0, ended.stderr
 
 
-def test_a_plan_loads_no_compiler(folder):
+def test_a_plan_of_one_push_loads_no_compiler(folder):
+    (folder / "scene.yaml").write_text(SCENE + "pushes: [{name: below, edge: 3, along: 0.5}]\n")
     code = (
         "import sys; sys.argv = ['flatpush', 'plan', 'scene.yaml']\n"
         "from flatpush.cli import main\n"

@@ -1,13 +1,16 @@
 """What holds for every plan of one push."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.geometry import pose_error, transform
-from flatpush.planning import push_options
-from flatpush.planning.plan import _ways
+from flatpush.planning import Planner
+from flatpush.steering import words
 
 
 def random_scene(seed: int, **planning) -> fp.Scene | None:
@@ -21,7 +24,7 @@ def random_scene(seed: int, **planning) -> fp.Scene | None:
     support = ("uniform", "outline", feet)[rng.integers(3)]
     thing = fp.Object(outline, support, rng.uniform(0.2, 0.8))
     start = (*rng.uniform(-0.15, 0.15, 2), rng.uniform(-3, 3))
-    return fp.Scene(thing, start, planning=fp.Planning(**planning))
+    return fp.Scene(thing, start, planning=fp.Planning(iterations=3300, **planning))
 
 
 SEEDS = [seed for seed in range(60) if random_scene(seed) is not None][:8]
@@ -56,29 +59,66 @@ def test_plans_of_every_model_verify_under_their_model(seed, model):
 
 
 @pytest.mark.parametrize("cost", ["flat", "pusher", "time"])
-def test_the_plan_is_the_cheapest_of_all_words_of_all_pushes(triangle, cost):
-    """Flat, pusher and time costs are what their names say, and may choose different ways (errata row 10)."""
+def test_the_plan_of_one_push_is_the_cheapest_of_its_words(triangle, cost):
+    """Flat, pusher and time costs are what their names say (errata row 10)."""
+    push = fp.Push("long edge", triangle.outline.at(2, 0.667), 2, 0.018)
     scene = fp.Scene(
         triangle,
         (0.06, 0.02, 2.356),
         pusher=fp.Pusher(fingers=2, spacing=0.018),
+        pushes=(push,),
         planning=fp.Planning(cost=cost),
     )
     plan = fp.plan(scene)
     assert fp.verify(plan).ok, fp.verify(plan).failed
-    costs = [c for option in push_options(plan.scene) if option.car for c, _ in _ways(plan.scene, option)]
-    arcs = sum(arc.cost for push in plan.pushes for arc in push.arcs)
-    assert arcs == pytest.approx(min(costs))
-    push = plan.pushes[0]
+    (option,) = Planner(scene).usable
+    car = option.car
+    found = words(car.left_centre, car.right_centre, car.direction, scene.start_pose, scene.goal_pose)
+    arcs = sum(arc.cost for arc in plan.pushes[0].arcs)
+    segment = plan.pushes[0]
     if cost == "pusher":
-        steps = np.linalg.norm(np.diff(push.pusher[:, :2], axis=0), axis=1)
+        steps = np.linalg.norm(np.diff(segment.pusher[:, :2], axis=0), axis=1)
         assert arcs == pytest.approx(steps.sum(), rel=1e-3)
-        lift = 2 * (scene.pusher.lift + scene.pusher.approach)
-        assert plan.cost == pytest.approx(arcs + lift)
+        assert plan.cost == pytest.approx(arcs + 2 * (scene.pusher.lift + scene.pusher.approach))
     elif cost == "time":
         assert plan.cost == pytest.approx(plan.duration)
     else:
-        assert plan.cost == pytest.approx(arcs)
+        radius = car.radius
+        lengths = [radius * (w.parameters[0] + w.parameters[2]) for w in found]
+        lengths = [
+            n + w.parameters[1] * (1 if w.word[1] == "S" else radius)
+            for n, w in zip(lengths, found, strict=True)
+        ]
+        assert plan.cost == pytest.approx(min(lengths))
+
+
+@pytest.mark.parametrize("cost", ["flat", "pusher", "time"])
+@pytest.mark.parametrize("transit", ["lift", "planar"])
+def test_many_pushes_verify_are_carried_out_and_are_never_dearer_than_one(triangle, cost, transit):
+    scene = fp.Scene(
+        triangle,
+        (0.06, 0.02, 2.356),
+        pusher=fp.Pusher(fingers=2, spacing=0.018, transit=transit),
+        planning=fp.Planning(cost=cost, iterations=3300),
+    )
+    plan = fp.plan(scene)
+    assert fp.verify(plan).ok, fp.verify(plan).failed
+    distance, turn = final_error(fp.simulate(plan), scene.goal)
+    assert distance < 1e-8
+    assert turn < 1e-8
+    planner = Planner(scene)
+    alone = min(
+        fp.plan(replace(scene, pushes=(push,))).cost for push in planner.scene.pushes if push is not None
+    )
+    assert plan.cost <= alone * (1 + 1e-9)
+    switches = sum(a.push != b.push for a, b in pairwise(plan.pushes))
+    arcs = sum(arc.cost for push in plan.pushes for arc in push.arcs)
+    if cost == "flat":
+        assert plan.cost == pytest.approx(arcs + 0.03 * switches)
+    elif cost == "time":
+        assert plan.cost == pytest.approx(plan.duration)
+    heights = [segment.height.max() for segment in plan.segments if segment.kind == "transit"]
+    assert max(heights) == (0 if transit == "planar" else scene.pusher.lift)
 
 
 def test_two_runs_agree_but_for_the_run_entry(triangle):
@@ -130,7 +170,7 @@ def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
     assert blocked.status == "no_plan"
     assert "clearance" in blocked.reason
     assert planned(obstacles=[beside], clearance=0.04).certificate.get("clearance", 1.0) >= 0.04
-    assert planned(bounds=(-0.06, -0.14, 0.06, 0.06)).status == "solved"
+    assert planned(bounds=(-0.08, -0.14, 0.08, 0.08)).status == "solved"
     assert planned(bounds=(-0.035, -0.14, 0.06, 0.06)).status == "no_plan"
 
 
@@ -138,7 +178,7 @@ def test_clearance_sees_a_needle_between_samples(triangle):
     """A thin obstacle that only an intermediate pose touches."""
     start = (0.0, -0.15, 0.0)
     pusher = fp.Pusher(fingers=2, spacing=0.018)
-    for x in np.linspace(-0.03, 0.015, 6):
+    for x in np.linspace(-0.03, 0.015, 4):
         needle = np.array([(x, -0.0901), (x + 1e-6, -0.0901), (x, -0.0899)])
         scene = fp.Scene(triangle, start, pusher=pusher, workspace=fp.Workspace(None, (needle,)))
         plan = fp.plan(scene)
@@ -148,9 +188,9 @@ def test_clearance_sees_a_needle_between_samples(triangle):
             from flatpush.simulation.pieces import pieces
 
             for piece in pieces(plan.segments, scene.start_pose):
-                for f in np.linspace(0, 1, 40):
+                for f in np.linspace(0, 1, 10):
                     shape = Polygon(transform(piece.object_at(f), triangle.outline.vertices))
-                    assert shape.distance(Polygon(needle)) >= plan.certificate.clearance - 2e-6
+                    assert shape.distance(Polygon(needle)) >= plan.certificate.clearance
 
 
 def test_a_rolling_finger_reaches_the_goal_by_the_samples(rectangle):

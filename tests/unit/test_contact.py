@@ -143,7 +143,7 @@ def test_two_fingers_fit_the_recorded_butterfly(data_folder, edge):
     outline = Outline.polygon(recorded)
     towards = {"left": (1, 0), "right": (-1, 0), "above": (0, -1), "below": (0, 1)}[edge]
     _, middle = travel(outline, -0.05 * np.array(towards), np.array(towards, dtype=float), 0.0)
-    at = outline.nearest(middle + [1e-6, 1e-6])  # not exactly at one of its many corners
+    at = outline.nearest(middle + 1e-6)  # not exactly at one of its many corners
     placement = place_fingers(outline, at, 2, 0.018, 0.0025)
     for tip, point in zip(placement.tips, placement.points, strict=True):
         assert outline.nearest(tip).distance == pytest.approx(0.0025, abs=1e-9)

@@ -17,7 +17,7 @@ def command(
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
     from ..documents import check_writable, load_scene
     from ..planning import describe
-    from ..planning.describe import turning_radii
+    from ..planning.description import turning_radii
 
     asked = load_scene(scene)
     if figure is not None:

@@ -19,11 +19,12 @@ def command(
     seed: Annotated[int | None, typer.Option(help="Of the anytime search.")] = None,
     iterations: Annotated[int | None, typer.Option(help="The anytime search stops here.")] = None,
     time_limit: Annotated[float | None, typer.Option(help="Seconds; only cuts the search short.")] = None,
+    tree: Annotated[Path | None, typer.Option(help="Search tree: read if it exists, else written.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
     from ..documents import check_writable, load_scene, plan_document, save_plan
-    from ..planning import plan
+    from ..planning import Planner
     from ..simulation import verify
 
     overrides: dict[str, Any] = {
@@ -49,7 +50,7 @@ def command(
 
         check_figure(figure)
     with telling("planning"):
-        found = plan(asked)
+        found = Planner(asked, tree).plan()
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))

@@ -8,6 +8,7 @@ from ..errors import InputError
 
 EXPERIMENTS = {
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
+    "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
 }
 

@@ -1,8 +1,18 @@
-"""From a scene to a plan: push points, one push, timing."""
+"""From a scene to a plan: push points, one push or many, transits, timing."""
 
 from .candidates import automatic_pushes
-from .describe import PushDescription, describe
+from .description import PushDescription, describe
+from .freedom import freedom
 from .options import PushOption, push_options
-from .plan import plan
+from .planner import Planner, plan
 
-__all__ = ["PushDescription", "PushOption", "automatic_pushes", "describe", "plan", "push_options"]
+__all__ = [
+    "Planner",
+    "PushDescription",
+    "PushOption",
+    "automatic_pushes",
+    "describe",
+    "freedom",
+    "plan",
+    "push_options",
+]

@@ -1,6 +1,6 @@
 """Automatic push points: on each edge or smooth stretch, the contact with the smallest turning radius."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from .options import PushOption, push_option
 
 # A stretch ends where its normal has turned this far, so that a smooth outline gets pushes from all sides.
 STRETCH = np.deg2rad(90.0)
-COARSE, REFINED = 11, 14
+COARSE, REFINED = 9, 8
+MOST = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +35,58 @@ class Stretch:
         along = (s - (ends[k] - self.lengths[k])) / self.lengths[k]
         return outline.at(self.edges[k], float(np.clip(along, 0.0, 1.0)))
 
+    def square_to(self, outline: Outline, cof: Array) -> Array:
+        """Fractions at which the normal passes through the COF: contacts that steer with the least friction."""
+        if outline.is_circle:
+            x, y = cof - outline.centre
+            if np.hypot(x, y) < 1e-9 * outline.radius:
+                return np.empty(0)
+            turns = np.array([0.0, 0.5]) + np.arctan2(y, x) / (2 * np.pi)
+            fractions = 4 * ((turns - self.offset) % 1.0)
+            return fractions[fractions < 1]
+        edges = outline.edges[list(self.edges)]
+        d = edges[:, 1] - edges[:, 0]
+        along = np.einsum("ij,ij->i", cof - edges[:, 0], d) / self.lengths**2
+        on = (along > 1e-6) & (along < 1 - 1e-6)
+        before = np.cumsum(self.lengths) - self.lengths
+        return ((before + along * self.lengths) / self.lengths.sum())[on]
+
 
 def automatic_pushes(scene: Scene) -> tuple[tuple[Push, ...], tuple[PushOption, ...]]:
-    """The pushes worth trying, and the best refused one of each stretch that has none."""
-    found, refused = [], []
+    """A small set of pushes that is worth switching between, and those left out, with the reason.
+
+    One push of each edge or smooth stretch; of more than MOST, those are kept that push in different
+    directions, smaller turning radii first.
+    """
+    found: list[PushOption] = []
+    refused: list[PushOption] = []
     for stretch in stretches(scene.object.outline):
         option = _best(scene, stretch)
         if option is None:
             continue
-        if option.car is None:
-            refused.append(option)
-        else:
-            found.append(option.push)
-    return tuple(found), tuple(refused)
+        (refused if option.car is None else found).append(option)
+    kept = _spread(found)
+    refused += [
+        replace(o, car=None, refusal="left out: other pushes in nearly this direction turn tighter")
+        for o in found
+        if o not in kept
+    ]
+    return tuple(option.push for option in kept), tuple(refused)
+
+
+def _spread(options: list[PushOption]) -> list[PushOption]:
+    """The tightest car, then again and again the one that adds most: angle to the nearest kept one, over its radius."""
+    if len(options) <= MOST:
+        return options
+    radii = np.array([o.car.radius for o in options if o.car])
+    directions = np.array([o.car.direction for o in options if o.car])
+    kept = [int(np.argmin(radii))]
+    while len(kept) < MOST:
+        angles = np.arccos(np.clip(directions @ directions[kept].T, -1.0, 1.0)).min(axis=1)
+        worth = angles / np.sqrt(radii)
+        worth[kept] = -1.0
+        kept.append(int(np.argmax(worth)))
+    return [options[i] for i in sorted(kept)]
 
 
 def stretches(outline: Outline) -> list[Stretch]:
@@ -87,6 +127,7 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
 
     grid = (np.arange(COARSE) + 0.5) / COARSE
     grid = grid[np.argsort(np.abs(grid - 0.5), kind="stable")]  # of equals, the one in the middle
+    grid = np.concatenate([stretch.square_to(scene.object.outline, scene.object.cof), grid])
     radii = [radius(float(f)) for f in grid]
     k = int(np.argmin(radii))
     if np.isfinite(radii[k]):

@@ -1,4 +1,4 @@
-"""From a word of a car to timed segments: landing, arcs, leaving."""
+"""From a word of a car to a timed push."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..geometry import compose, exp, transform
 from ..geometry.pose import Array
-from ..problem import Arc, Pusher, PushSegment, Scene, TransitSegment
+from ..problem import Arc, Pusher, PushSegment, Scene
 from ..steering.car import Car
 from .timing import Trapezoid
 
@@ -29,17 +29,25 @@ class ArcGeometry:
 def arcs_of(car: Car, word: str, parameters: Array, fingers: Array) -> list[ArcGeometry]:
     """The arcs of a word: angles [rad] of turns, lengths [m] of straight motions; arcs of no length are left out."""
     twists = {"L": car.left, "S": car.straight, "R": car.right}
-    centres = {"L": car.left_centre, "R": car.right_centre}
-    tips = transform(car.pusher, fingers)
+    reaches = dict(zip("LSR", tip_radii(car, fingers), strict=True))
     found = []
     for letter, value in zip(word, parameters, strict=True):
         flat = float(value) * (car.radius if letter != "S" else 1.0)
         if flat <= 1e-12:
             continue
-        reach = np.inf if letter == "S" else float(np.max(np.linalg.norm(tips - centres[letter], axis=1)))
+        reach = float(reaches[letter])
         length = float(value) * (1.0 if letter == "S" else reach)
         found.append(ArcGeometry(TURNS[letter], flat * twists[letter], length, reach, flat))
     return found
+
+
+def tip_radii(car: Car, fingers: Array) -> Array:
+    """Radii of the fastest fingertip's way in the left turn, straight (inf) and in the right turn, shape (3,) [m]."""
+    tips = transform(car.pusher, fingers)
+    left, right = (
+        float(np.max(np.linalg.norm(tips - centre, axis=1))) for centre in (car.left_centre, car.right_centre)
+    )
+    return np.array([left, np.inf, right])
 
 
 def arc_duration(arc: ArcGeometry, pusher: Pusher) -> float:
@@ -85,28 +93,6 @@ def push_segment(
 def fingertips(push_fingers: int, spacing: float) -> Array:
     """Fingertip centres in E, shape (1 or 2, 2)."""
     return np.zeros((1, 2)) if push_fingers == 1 else np.array([[0.0, spacing / 2], [0.0, -spacing / 2]])
-
-
-def landing(pusher: Pusher, contact_pose: Array, leaving: bool = False) -> TransitSegment:
-    """From above (planar transits: from beside) onto the contact, straight along the push direction; or back."""
-    away = compose(contact_pose, [-pusher.approach, 0.0, 0.0])
-    ways = [(away, contact_pose, 0.0, 0.0, pusher.approach)]
-    if pusher.transit == "lift":
-        ways.insert(0, (away, away, pusher.lift, 0.0, pusher.lift))
-    first = ways[0]
-    times, poses, heights = [np.zeros(1)], [first[0][None]], [np.array([first[2]])]
-    clock = 0.0
-    for a, b, high, low, length in ways:
-        law = Trapezoid.along(length, np.inf, pusher.speed, pusher.acceleration)
-        t, f = law.samples(float(np.sqrt(8 * SAG / pusher.acceleration)), 1)
-        times.append(clock + t[1:])
-        poses.append(a + f[1:, None] * (b - a))
-        heights.append(high + f[1:] * (low - high))
-        clock += law.duration
-    t, X, h = np.concatenate(times), np.concatenate(poses), np.concatenate(heights)
-    if leaving:
-        return TransitSegment(t[-1] - t[::-1], X[::-1].copy(), h[::-1].copy())
-    return TransitSegment(t, X, h)
 
 
 def _centre(step: Array) -> Array:

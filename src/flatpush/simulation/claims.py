@@ -235,14 +235,15 @@ def sample_errors(scene: Scene, segments: Sequence[PushSegment | TransitSegment]
         path: largest distance of an object sample from its arcs [m or rad].
         fingers: largest error of the fingertips' place on the outline [m].
         jump: largest jump of the pusher between segments [m or rad].
+        transit: deepest overlap of a fingertip with the resting object while the pusher moves on the table [m].
         speed: largest mean speed of a fingertip between samples, over the limit.
         clock: largest step back in time [s].
     """
-    errors = dict.fromkeys(("start", "path", "fingers", "jump", "speed", "clock"), 0.0)
+    errors = dict.fromkeys(("start", "path", "fingers", "jump", "transit", "speed", "clock"), 0.0)
     pose = np.asarray(scene.start, dtype=float)
     hand: Array | None = None
     limits = scene.pusher
-    for segment in segments:
+    for k, segment in enumerate(segments):
         if isinstance(segment, PushSegment):
             placement = placement_of(scene, named(scene, segment.push))
             errors["start"] = max(errors["start"], _most(segment.object[0], pose))
@@ -265,13 +266,30 @@ def sample_errors(scene: Scene, segments: Sequence[PushSegment | TransitSegment]
             errors["path"] = max(errors["path"], _most(segment.object[-1], pose))
             speeds = _tip_speeds(segment.times, segment.pusher, segment.fingers)
         else:
-            speeds = _tip_speeds(segment.times, segment.pusher, np.zeros((1, 2)))
+            around = next(
+                (s for s in [*reversed(segments[:k]), *segments[k:]] if isinstance(s, PushSegment)), None
+            )
+            tips = np.zeros((1, 2)) if around is None else around.fingers
+            speeds = _tip_speeds(segment.times, segment.pusher, tips)
+            errors["transit"] = max(errors["transit"], _overlap(scene, segment, pose, tips))
         errors["speed"] = max(errors["speed"], float(np.max(speeds, initial=0.0)) / limits.speed)
         errors["clock"] = max(errors["clock"], float(np.max(-np.diff(segment.times), initial=0.0)))
         if hand is not None:
             errors["jump"] = max(errors["jump"], _most(segment.pusher[0], hand))
         hand = segment.pusher[-1]
     return errors
+
+
+def _overlap(scene: Scene, segment: TransitSegment, pose: Array, fingers: Array) -> float:
+    """How deep a fingertip on the table gets into the object, at most [m]."""
+    outline, radius = scene.object.outline, scene.pusher.tip_radius
+    low = segment.height <= 0
+    tips = [transform(relative(pose, X), fingers) for X in segment.pusher[low]]
+    return (
+        max((radius - outline.nearest(tip).distance for tip in np.concatenate(tips)), default=0.0)
+        if tips
+        else 0.0
+    )
 
 
 def _most(a: Array, b: Array) -> float:

@@ -108,24 +108,11 @@ def shortest_length(starts: ArrayLike, goals: ArrayLike, radius: float) -> Array
     >>> float(shortest_length([0, 0, 0], [0, 2, np.pi], 1.0)) == np.pi
     True
     """
-    X, Y = _poses(starts, "starts"), _poses(goals, "goals")
-    radius = _checked_radius(radius)
-    try:
-        shape = np.broadcast_shapes(X.shape[:-1], Y.shape[:-1])
-    except ValueError as error:
-        raise InputError(
-            "the leading axes of starts and goals broadcast", value=(X.shape, Y.shape)
-        ) from error
-    if shape == ():
-        return np.asarray(radius * sum(_shortest(X, Y, radius)[1]))
-    from .kernels import dubins_lengths
+    from .lengths import dubins_lengths
 
-    table = (-1, shape[-1], 3)
-    lengths = np.empty(shape)
-    if lengths.size:
-        pairs = (np.broadcast_to(poses, (*shape, 3)).reshape(table) for poses in (X, Y))
-        dubins_lengths(*pairs, radius, lengths.reshape(table[:2]))
-    return lengths
+    if np.ndim(starts) == np.ndim(goals) == 1:
+        return np.asarray(shortest_path(starts, goals, radius).length)
+    return dubins_lengths(starts, goals, radius)
 
 
 def _shortest(start: Array, goal: Array, radius: float) -> tuple[str, tuple[float, float, float]]:
@@ -177,14 +164,19 @@ def _end(word: str, arcs: tuple[float, float, float]) -> complex:
 
 
 def _poses(values: ArrayLike, name: str) -> Array:
+    poses = _shaped_poses(values, name)
+    if not np.isfinite(poses).all():
+        raise InputError(f"{name}: poses are finite", value=poses[~np.isfinite(poses).all(axis=-1)])
+    return poses
+
+
+def _shaped_poses(values: ArrayLike, name: str) -> Array:
     try:
         poses = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: poses are numbers (x, y, heading)", value=values) from error
     if poses.ndim == 0 or poses.shape[-1] != 3:
         raise InputError(f"{name}: poses have the shape (..., 3)", value=poses.shape)
-    if not np.isfinite(poses).all():
-        raise InputError(f"{name}: poses are finite", value=poses[~np.isfinite(poses).all(axis=-1)])
     return poses
 
 

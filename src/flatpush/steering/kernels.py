@@ -1,203 +1,354 @@
-"""Compiled twins of dubins.py and three_twist.py, which explain them.
+"""Compiled twins of dubins.py and three_twist.py, which explain them, for many pairs of poses at once.
 
-The lengths of many Dubins paths are computed without a branch, so that LLVM does several pairs at once: which
-word is feasible, and whether an arc needs a full turn more, are decided by signs of cross products and become
-selects. The helpers are inlined before LLVM sees the loop; without that it would stop vectorising.
+The lengths are computed without a branch, so that LLVM does several pairs at once: which word is feasible, and
+whether an arc needs a full turn more, are decided by signs of cross products and become selects. Half of the words
+are mirror images of the others. Poses come as cosine and sine, and few angles need an inverse function:
+the arcs of LSL add up to the heading difference, those of LRL to that less the apex angle.
+
+Each function compiles when it is first called, so that only what is used is paid for.
 """
 
 import math
 from typing import Any
 
-import numba as nb
 import numpy as np
-from numba.extending import intrinsic
 
 from ..geometry.pose import Array
+from .vectors.kernels import (
+    SLACK,
+    TURN,
+    _angle,
+    _large,
+    _ratio,
+    _select,
+    _small,
+    _turned,
+    _widest_vectors,
+    batch,
+    block,
+)
 
-TURN = 2 * math.pi
-TOLERANCE = 4e-10  # as in dubins.py
+__all__ = [
+    "_angle",
+    "_widest_vectors",
+    "dubins_between",
+    "shortest_word",
+    "three_twist_between",
+    "timed_between",
+]
+
+TOLERANCE = 4e-10  # as in dubins.py; of a length, per length of the query
+LOOSE = 2e-10  # as in three_twist.py, where a length is that of the centres as well
+NEAR = 4 * TOLERANCE  # where what is compared is four times a length, or a square of about four
 NEVER = 1e300
-TILE = 512
-POSES = nb.types.Array(nb.float64, 3, "A", readonly=True)
+TINY = 1e-30
+
+Four = tuple[float, float, float, float]
 
 
-@intrinsic
-def _widest_vectors(typing: Any) -> Any:
-    """Asks LLVM for 512-bit vectors where there are any; left alone it often prefers 256 bits."""
+@block
+def dubins_between(
+    xi: float,
+    yi: float,
+    ci: float,
+    si: float,
+    hi: float,
+    xj: float,
+    yj: float,
+    cj: float,
+    sj: float,
+    hj: float,
+) -> float:
+    """Length of the shortest Dubins path from pose i to pose j [radii].
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        if isinstance(builder.function.attributes, set):
-            set.add(builder.function.attributes, '"prefer-vector-width"="512"')
-        return context.get_dummy_value()
-
-    return nb.void(), generate
-
-
-@nb.njit(inline="always")
-def _arctan(y: float, x: float) -> float:
-    """The angle of (x, y) in the first quadrant; 0 for (0, 0). Error 1e-16."""
-    steep = y > x
-    large = y if steep else x
-    small = x if steep else y
-    far = small > 0.41421356237309503 * large  # beyond π/8: the distance from the diagonal instead
-    top = small - large if far else small
-    bottom = small + large if far else large
-    r = top / (bottom + 1e-300)
-    q = r * r
-    # Chebyshev interpolant of arctan(√q)/√q on [0, tan²(π/8)], error 7e-17.
-    q2 = q * q
-    q4 = q2 * q2
-    a0 = (-0.33333333333328435 + q * 0.19999999998854434) + q2 * (
-        -0.14285714180925005 + q * 0.11111106178547345
-    )
-    a1 = (-0.09090773034671443 + q * 0.07689952983789837) + q2 * (
-        -0.06640229875349955 + q * 0.0568832979330602
-    )
-    a2 = -0.043480005258692 + q * 0.021134787499439724
-    p = a0 + q4 * (a1 + q4 * a2)
-    angle = r + r * (q * p)
-    angle = angle + 0.7853981633974483 if far else angle
-    return 1.5707963267948966 - angle if steep else angle
-
-
-@nb.njit(inline="always")
-def _angle(y: float, x: float) -> float:
-    """atan2, in [-π, π]."""
-    angle = _arctan(abs(y), abs(x))
-    angle = math.pi - angle if x < 0 else angle
-    return -angle if y < 0 else angle
-
-
-@nb.njit(inline="always")
-def _sine_cosine(angle: float) -> tuple[float, float]:
-    """sin and cos for angles up to 1e6, error 2e-16: reduced by quarters, then Chebyshev interpolants."""
-    quarter = np.floor(angle * 0.6366197723675814 + 0.5)
-    r = (angle - quarter * 1.5707963267341256) - quarter * 6.077100506506192e-11
-    q = r * r
-    s = -2.5050718764980743e-08 + q * 1.5894842619472324e-10
-    s = 2.7557313387198574e-06 + q * s
-    s = -0.00019841269828677267 + q * s
-    s = 0.008333333333320385 + q * s
-    s = -0.16666666666666616 + q * s
-    s = r + r * (q * s)
-    c = 2.0875542433268676e-09 - q * 1.1351673645370898e-11
-    c = -2.7557312733634936e-07 + q * c
-    c = 2.480158728226157e-05 + q * c
-    c = -0.0013888888888857495 + q * c
-    c = 0.041666666666666415 + q * c
-    c = 1.0 - q * 0.5 + q * (q * c)
-    quarter = quarter - 4.0 * np.floor(0.25 * quarter)
-    odd = (quarter == 1.0) | (quarter == 3.0)
-    sine = c if odd else s
-    cosine = s if odd else c
-    sine = -sine if quarter >= 2.0 else sine
-    cosine = -cosine if (quarter == 1.0) | (quarter == 2.0) else cosine
-    return sine, cosine
-
-
-@nb.njit(inline="always")
-def _between(x: float, y: float, c: float, s: float, angle: float, tolerance: float) -> bool:
-    """Whether (x, y) points between the headings 0 and `angle` in [0, 2π), of direction (c, s).
-
-    A miss by less than the tolerance, as a length, counts as a hit.
+    A pose is x and y [radii], cosine and sine of its heading, and the heading in [0, 2π). Without a branch: a loop
+    over i or j does several at once if its function calls _widest_vectors() and has error_model="numpy".
     """
-    after = y >= -tolerance
-    before = x * s - y * c >= -tolerance
-    ahead = x * (1.0 + c) + y * s >= -tolerance  # a sector near zero has no tail
-    return (after & before & ahead) if angle < math.pi else (after | before)
+    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    back = TURN - delta
+    k = 1.0 - c
+    # The goal's offset along and across its own heading; straight pieces of LSR and RSL, LSL and RSR.
+    p, q = x * s - y * c, x * c + y * s
+    m, g = (x * x + y * y) - 2.0 * k, 2.0 * (y - p)
+    lsr2, rsl2 = _large(m - g, 0.0), _large(m + g, 0.0)
+    lsr, rsl = math.sqrt(lsr2), math.sqrt(rsl2)
+    xm, xp, ym, yp = x - s, x + s, y - k, y + k
+    lsl2, rsr2 = xm * xm + ym * ym, xp * xp + yp * yp
+    lsl, rsr = math.sqrt(lsl2), math.sqrt(rsr2)
+    # Four times the cosine of half the apex angle of LRL and RLR; the sine is a quarter of lsl and rsr.
+    lrl2, rlr2 = 16.0 - lsl2, 16.0 - rsr2
+    lrl, rlr = math.sqrt(_large(lrl2, 0.0)), math.sqrt(_large(rlr2, 0.0))
+
+    # LSR, RSL: the first arcs are the angles of (ax, ay), (bx, by). Their tangents of the half share a division.
+    u, v = y - (1.0 + c), y + (1.0 + c)
+    ax, ay = xp * lsr - (u + u), u * lsr + (xp + xp)
+    bx, by = xm * rsl + (v + v), (xm + xm) - v * rsl
+    a_big = _large(abs(ax), abs(ay)) + (4.0 + lsr2)
+    b_big = _large(abs(bx), abs(by)) + (4.0 + rsl2)
+    inverse = 1.0 / (a_big * b_big)
+    a_tangent = _small(abs(ax), abs(ay)) * (b_big * inverse)
+    b_tangent = _small(abs(bx), abs(by)) * (a_big * inverse)
+
+    # LSL, RSR: is the straight piece's heading between those of start and goal?
+    tolerance = TOLERANCE + (0.5 * TOLERANCE) * (lsl + rsr)
+    low, high, f = _small(y, p), _large(y, p), x + q
+    fm, fp = f - (s + s), f + (s + s)
+    least = k - tolerance
+    left = _select(delta < math.pi, _small(low, fm + k), high)
+    right = _select(delta > math.pi, _small(-high, fp + k), -low)
+    length = lsl + delta
+    best = _select(left < least, length + TURN, length)
+    length = rsr + back
+    best = _small(best, _select(right < least, length + TURN, length))
+
+    # LRL, RLR: is that of the end of the first arc?
+    pm, pp, qm, qp = p - k, p + k, q - s, q + s
+    em, ep = (y + p) - (k + k), (y + p) + (k + k)
+    turn = delta - math.pi
+    ratio = _ratio(0.25 * lsl - 0.5)
+    outer = lrl * ratio + turn
+    outer = _select(outer < 0.0, outer + TURN, outer)
+    after, before, ahead = ym * lrl - xm * lsl, pm * lrl - qm * lsl, fm * lrl + em * lsl
+    miss = _select(outer < math.pi, _large(_large(after, before), ahead), _small(after, before))
+    length = outer + (lrl * ratio + math.pi)
+    length = _select(miss > NEAR, length + TURN, length)
+    best = _select(lrl2 >= -NEAR, _small(best, length), best)
+    ratio = _ratio(0.25 * rsr - 0.5)
+    outer = rlr * ratio - turn
+    outer = _select(outer < 0.0, outer + TURN, outer)
+    after, before, ahead = yp * rlr + xp * rsr, pp * rlr + qp * rsr, ep * rsr - fp * rlr
+    hit = _select(outer < math.pi, _small(_small(after, before), ahead), _large(after, before))
+    length = outer + (rlr * ratio + math.pi)
+    length = _select(hit < -NEAR, length + TURN, length)
+    best = _select(rlr2 >= -NEAR, _small(best, length), best)
+
+    # The rest of LSR and RSL comes last: with this order the division is done by then.
+    first = _turned(a_tangent, ax, ay)
+    length = lsr + first + _remaining(first, delta)
+    best = _select(m - g >= -NEAR, _small(best, length), best)
+    first = _turned(b_tangent, bx, by)
+    length = rsl + first + _remaining(first, back)
+    return _select(m + g >= -NEAR, _small(best, length), best)
 
 
-@nb.njit(inline="always")
-def _left_words(x: float, y: float, c: float, s: float, delta: float) -> float:
-    """Shortest of LSL, LRL and LSR from (0, 0, 0) to (x, y, delta), delta in [0, 2π), radius 1."""
-    tolerance = TOLERANCE * (1.0 + abs(x) + abs(y))
-    dx, dy = x - s, y + c - 1.0
+@block
+def three_twist_between(
+    xi: float,
+    yi: float,
+    ci: float,
+    si: float,
+    hi: float,
+    xj: float,
+    yj: float,
+    cj: float,
+    sj: float,
+    hj: float,
+    tilt_c: float,
+    tilt_s: float,
+    wl: float,
+    ws: float,
+    wr: float,
+) -> float:
+    """Cost of the cheapest word of a car with any centres, as three_twist.shortest_word finds it.
+
+    A pose is that of the axle, given as in dubins_between: the midpoint of the turning centres in units of half their
+    distance R, and the heading across their line (with the left centre to the left). The straight direction is
+    (tilt_c, tilt_s) seen from that heading, tilt_c > 0. wl, wr: cost of a radian; ws: of a length R straight on.
+    """
+    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    back = TURN - delta
+    for_left = _alike(x, y, c, s, delta, tilt_c, tilt_s)
+    for_right = _alike(x, -y, c, -s, back, tilt_c, -tilt_s)
+    straight, same, z, long, short = for_left[:5]
+    best = ws * straight + wl * same
+    cost = _small(wr * (TURN - z) + wl * long, wr * z + wl * short)
+    best = _select(straight <= 4.0 + NEAR, _small(best, cost), best)
+    straight, same, z, long, short = for_right[:5]
+    best = _small(best, ws * straight + wr * same)
+    cost = _small(wl * (TURN - z) + wr * long, wl * z + wr * short)
+    best = _select(straight <= 4.0 + NEAR, _small(best, cost), best)
+    lsr, rsl, other = _unlike(x, y, c, s, delta, tilt_c, tilt_s)
+    best = _small(best, ws * lsr[1] + (wl * lsr[0] + wr * lsr[2]) + lsr[3])
+    best = _small(best, ws * rsl[1] + (wr * rsl[0] + wl * rsl[2]) + rsl[3])
+    wa, wb = _select(tilt_s > 0.0, wl, wr), _select(tilt_s > 0.0, wr, wl)
+    return _small(best, ws * other[1] + (wa * other[0] + wb * other[2]) + other[3])
+
+
+@block
+def timed_between(
+    xi: float,
+    yi: float,
+    ci: float,
+    si: float,
+    hi: float,
+    xj: float,
+    yj: float,
+    cj: float,
+    sj: float,
+    hj: float,
+    tilt_c: float,
+    tilt_s: float,
+    left: Four,
+    straight: Four,
+    right: Four,
+) -> float:
+    """As three_twist_between where each piece starts and ends at rest, so that its time is no multiple of its length.
+
+    A law holds (slope, ramp, root, knee) per radian or length R: an amount takes slope · amount + ramp where it
+    exceeds the knee, and the root of root · amount where it does not (lengths.time_laws).
+    """
+    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    best = _timed_alike(_alike(x, y, c, s, delta, tilt_c, tilt_s), delta, left, straight, right)
+    back = TURN - delta
+    cost = _timed_alike(_alike(x, -y, c, -s, back, tilt_c, -tilt_s), back, right, straight, left)
+    best = _small(best, cost)
+    lsr, rsl, other = _unlike(x, y, c, s, delta, tilt_c, tilt_s)
+    tilts_left = tilt_s > 0.0
+    first = _select(tilts_left, _time(left, other[0]), _time(right, other[0]))
+    last = _select(tilts_left, _time(right, other[2]), _time(left, other[2]))
+    best = _small(best, first + _time(straight, other[1]) + last + other[3])
+    cost = _time(left, lsr[0]) + _time(straight, lsr[1]) + _time(right, lsr[2]) + lsr[3]
+    best = _small(best, cost)
+    return _small(best, _time(right, rsl[0]) + _time(straight, rsl[1]) + _time(left, rsl[2]) + rsl[3])
+
+
+@block
+def _time(law: Four, amount: float) -> float:
+    return _select(amount > law[3], law[0] * amount + law[1], math.sqrt(law[2] * amount))
+
+
+@block
+def _timed_alike(found: Any, delta: float, outer: Four, straight: Four, middle: Four) -> float:
+    way, same, z, long, short, vx, vy, tx, ty, nx, ny, tolerance, d_long, d_short = found
+    first = _first(vx, vy, way, same, delta, tolerance)
+    best = _time(outer, first) + _time(straight, way) + _time(outer, same - first)
+    first = _first(tx, ty, way, long, d_long, tolerance)
+    cost = _time(outer, first) + _time(middle, TURN - z) + _time(outer, long - first)
+    first = _first(nx, ny, way, short, d_short, tolerance)
+    cost = _small(cost, _time(outer, first) + _time(middle, z) + _time(outer, short - first))
+    return _select(way <= 4.0 + NEAR, _small(best, cost), best)
+
+
+@block
+def _first(vx: float, vy: float, size: float, total: float, angle: float, tolerance: float) -> float:
+    """The first of two arcs to the same side that add up to total: angle, or a turn more."""
+    large, small = _large(abs(vx), abs(vy)), _small(abs(vx), abs(vy))
+    first = _turned(small / (large + _large(size, TINY)), vx, vy)
+    nearest = _select(first - angle < TURN - first, angle, 0.0)
+    first = _select((total <= angle) & (first > angle), nearest, first)
+    return _select(size <= tolerance, 0.0, first)
+
+
+@block
+def _alike(
+    x: float, y: float, c: float, s: float, delta: float, tilt_c: float, tilt_s: float
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float]:
+    """LSL and both LRL.
+
+    Returns the distance of the centres and both arcs of LSL together; the smaller middle arc and the outer arcs
+    together of the LRL with the larger one and with the smaller one; then, for _first, the directions (x, y) in which
+    the middle pieces begin, a tolerance of lengths, and those two sums less a turn too many.
+    """
+    k = 1.0 - c
+    dx, dy = x - s, y - k
+    fx, fy = (x * c + y * s) - s, (x * s - y * c) - k
     square = dx * dx + dy * dy
-    straight = math.sqrt(square)
-    lsl = straight + delta + (0.0 if _between(dx, dy, c, s, delta, tolerance) else TURN)
+    d = math.sqrt(square)
+    tolerance = LOOSE + LOOSE * d
+    vx, vy = dx * tilt_c + dy * tilt_s, dy * tilt_c - dx * tilt_s
+    same = _both(vx, vy, fx * tilt_c - fy * tilt_s, fy * tilt_c + fx * tilt_s, delta, tolerance)
 
-    # LRL: half the apex has sine straight/4; the first arc is that of D, turned on by π - half.
-    up = 0.25 * straight
-    rest = 1.0 - square * 0.0625
-    across = math.sqrt(rest if rest > 0.0 else 0.0)
-    half = _arctan(up, across)
-    tx, ty = -(dx * across + dy * up), dx * up - dy * across
-    c2, s2 = across * across - up * up, 2.0 * across * up
-    ec, es = c * c2 + s * s2, s * c2 - c * s2
-    outer = delta - 2.0 * half  # the two outer arcs together, up to a turn
-    outer = outer + TURN if outer < 0.0 else outer
-    lrl = TURN - 2.0 * half + outer + (0.0 if _between(tx, ty, ec, es, outer, tolerance) else TURN)
-    lrl = lrl if rest >= -0.5 * tolerance else NEVER
+    rest = math.sqrt(_large(16.0 - square, 0.0))
+    z = math.pi - rest * _ratio(0.25 * d - 0.5)
+    ax, ay, bx, by = dx * rest, dy * rest, dx * d, dy * d
+    ex, ey, gx, gy = fx * rest, fy * rest, fx * d, fy * d
+    wide = delta - z
+    wide = _select(wide < 0.0, wide + TURN, wide)
+    long = _both(-(ax + by), bx - ay, -(ex + gy), gx - ey, wide, 4.0 * LOOSE)
+    narrow = delta + z
+    narrow = _select(narrow >= TURN, narrow - TURN, narrow)
+    short = _both(ax - by, ay + bx, ex - gy, gx + ey, narrow, 4.0 * LOOSE)
+    return (
+        d, same, z, long, short,
+        vx, vy, -0.25 * (ax + by), 0.25 * (bx - ay), 0.25 * (ax - by), 0.25 * (ay + bx), tolerance, wide, narrow,
+    )  # fmt: skip
 
-    dx, dy = x + s, y - c - 1.0
-    square = dx * dx + dy * dy - 4.0
-    straight = math.sqrt(square if square > 0.0 else 0.0)
-    slack = 0.5 * TOLERANCE
-    first = _angle(dy * straight + 2.0 * dx, dx * straight - 2.0 * dy)
-    first = first + TURN if first < -slack else first
-    first = first if first > 0.0 else 0.0
+
+@block
+def _both(vx: float, vy: float, wx: float, wy: float, angle: float, tolerance: float) -> float:
+    """Two arcs to the same side: angle, in [0, 2π), or a turn more if the direction between is not.
+
+    The direction is (vx, vy) seen from the start; its mirror image at the goal's heading is (wx, wy).
+    """
+    within = _select(angle < math.pi, _small(_small(vy, wy), vx + wx), _large(vy, wy))
+    return _select(within < -tolerance, angle + TURN, angle)
+
+
+@block
+def _unlike(
+    x: float, y: float, c: float, s: float, delta: float, tilt_c: float, tilt_s: float
+) -> tuple[Four, Four, Four]:
+    """LSR, RSL and the second solution of the one that leans back: first arc, straight piece, last arc, 0 or NEVER."""
+    k, back = 1.0 + c, TURN - delta
+    lx, ly, rx, ry = x + s, y - k, x - s, -(y + k)
+    width, lean = 2.0 * tilt_c, 2.0 * tilt_s
+    l2, r2 = lx * lx + ly * ly, rx * rx + ry * ry
+    l_rest, r_rest = l2 - width * width, r2 - width * width
+    l_way, r_way = math.sqrt(_large(l_rest, 0.0)), math.sqrt(_large(r_rest, 0.0))
+    lx, ly = lx * tilt_c + ly * tilt_s, ly * tilt_c - lx * tilt_s
+    rx, ry = rx * tilt_c - ry * tilt_s, ry * tilt_c + rx * tilt_s
+    left = tilt_s > 0.0
+    ox, oy, o_way = _select(left, lx, rx), _select(left, ly, ry), _select(left, l_way, r_way)
+    o2, o_rest, o_delta = _select(left, l2, r2), _select(left, l_rest, r_rest), _select(left, delta, back)
+
+    ax, ay = lx * l_way - width * ly, ly * l_way + width * lx
+    bx, by = rx * r_way - width * ry, ry * r_way + width * rx
+    ox, oy = -(ox * o_way + width * oy), width * ox - oy * o_way
+    a_big = _large(abs(ax), abs(ay)) + _large(l2, TINY)
+    b_big = _large(abs(bx), abs(by)) + _large(r2, TINY)
+    o_big = _large(abs(ox), abs(oy)) + _large(o2, TINY)
+    inverse = 1.0 / (a_big * b_big * o_big)
+    a = _turned(_small(abs(ax), abs(ay)) * (b_big * o_big * inverse), ax, ay)
+    b = _turned(_small(abs(bx), abs(by)) * (a_big * o_big * inverse), bx, by)
+    o = _turned(_small(abs(ox), abs(oy)) * (a_big * b_big * inverse), ox, oy)
+    l_way, r_way, o_way = l_way + lean, r_way - lean, abs(lean) - o_way
+    l_fit = _select(_small(l_rest, l_way) >= -NEAR, 0.0, NEVER)
+    r_fit = _select(_small(r_rest, r_way) >= -NEAR, 0.0, NEVER)
+    o_fit = _select(_small(o_rest, o_way) >= -NEAR, 0.0, NEVER)
+    return (
+        (a, _large(l_way, 0.0), _remaining(a, delta), l_fit),
+        (b, _large(r_way, 0.0), _remaining(b, back), r_fit),
+        (o, _large(o_way, 0.0), _remaining(o, o_delta), o_fit),
+    )
+
+
+@block
+def _seen_from(
+    xi: float,
+    yi: float,
+    ci: float,
+    si: float,
+    hi: float,
+    xj: float,
+    yj: float,
+    cj: float,
+    sj: float,
+    hj: float,
+) -> tuple[float, float, float, float, float]:
+    """Pose j in the frame of pose i: x, y, cosine, sine, heading in [0, 2π]."""
+    gx, gy, delta = xj - xi, yj - yi, hj - hi
+    delta = _select(delta < 0.0, delta + TURN, delta)
+    return ci * gx + si * gy, ci * gy - si * gx, ci * cj + si * sj, ci * sj - si * cj, delta
+
+
+@block
+def _remaining(first: float, delta: float) -> float:
+    """The last arc of a word that turns back."""
     last = first - delta
-    last = last + TURN if last < -slack else last
-    last = last if last > 0.0 else 0.0
-    lsr = first + straight + last
-    lsr = lsr if square >= -4.0 * tolerance else NEVER
-
-    best = lsl if lsl < lrl else lrl
-    return best if best < lsr else lsr
+    return _large(_select(last < -SLACK, last + TURN, last), 0.0)
 
 
-@nb.njit(
-    nb.void(POSES, POSES, nb.float64, nb.float64[:, ::1]),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    fastmath={"contract"},
-)
-def dubins_lengths(starts: Array, goals: Array, radius: float, lengths: Array) -> None:
-    """Fills lengths (n, m) for poses of shape (n, m, 3), in tiles that stay in the first cache."""
-    _widest_vectors()
-    tile = np.empty((5, TILE))
-    scale = 1.0 / radius
-    rows, columns = lengths.shape
-    for row in range(rows):
-        for begin in range(0, columns, TILE):
-            count = min(TILE, columns - begin)
-            for i in range(count):
-                tile[0, i] = (goals[row, begin + i, 0] - starts[row, begin + i, 0]) * scale
-                tile[1, i] = (goals[row, begin + i, 1] - starts[row, begin + i, 1]) * scale
-                tile[2, i] = starts[row, begin + i, 2]
-                tile[4, i] = goals[row, begin + i, 2] - starts[row, begin + i, 2]
-            out = lengths[row, begin : begin + count]
-            for i in range(count):  # the goal in the frame of the start: x, y, cos, sin, heading
-                s0, c0 = _sine_cosine(tile[2, i])
-                delta = tile[4, i]
-                delta = delta - TURN * np.floor(delta * (1.0 / TURN))
-                delta = delta if (delta >= 0.0) & (delta < TURN) else 0.0
-                s, c = _sine_cosine(delta)
-                x = c0 * tile[0, i] + s0 * tile[1, i]
-                y = c0 * tile[1, i] - s0 * tile[0, i]
-                tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i] = x, y, c, s, delta
-                out[i] = NEVER
-            for side in range(2):  # words that begin with L, then their mirror images
-                sign = 1.0 - 2.0 * side
-                for i in range(count):
-                    back = TURN - tile[4, i] if tile[4, i] > 0.0 else 0.0
-                    delta = tile[4, i] if sign > 0.0 else back
-                    length = radius * _left_words(
-                        tile[0, i], sign * tile[1, i], tile[2, i], sign * tile[3, i], delta
-                    )
-                    out[i] = length if length < out[i] else out[i]
-
-
-VECTOR = nb.types.Array(nb.float64, 1, "A", readonly=True)
-
-
-@nb.njit(
-    nb.types.Tuple((nb.int64, nb.float64, nb.float64, nb.float64, nb.float64))(*(6 * (VECTOR,))),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
+@batch
 def shortest_word(
     c_left: Array, c_right: Array, direction: Array, start: Array, goal: Array, weights: Array
 ) -> tuple[int, float, float, float, float]:

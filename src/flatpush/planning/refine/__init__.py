@@ -1,0 +1,5 @@
+"""Continuous refinement of plans of many pushes."""
+
+from .refine import Refined, improvements, refine
+
+__all__ = ["Refined", "improvements", "refine"]

@@ -1,0 +1,165 @@
+"""Seeds: the best plan of every short push sequence over one pool of poses, as starts for the descent."""
+
+import numpy as np
+
+from ...geometry import compose, exp
+from ...geometry.pose import Array
+from .problem import Candidate, Query
+
+MOST_SUMS = 3_000_000  # sums of one table cell and a cost to go, per pool: bounds the size of the table
+MOST_CELLS = 10_000  # of the table of cars that are not Dubins cars
+TAILS = 16  # pairs of pushes that longer sequences may end with
+MOST_TRIPLES = 800  # sequences of three pushes solved per round after a random first arc
+ARC_SEEDS = 24
+Way = tuple[float, tuple[int, ...], tuple[int, ...]]  # cost, pushes, poses of the pool
+QUOTAS = {2: 16, 3: 20, 4: 14}  # seeds by number of legs
+
+
+def sample_poses(query: Query, rng: np.random.Generator, count: int, near: list[Array]) -> Array:
+    """Poses where switching may pay, shape (count, 3).
+
+    Half of them around start and goal, the others one or two arcs away from the start or before the goal (good plans
+    have few arcs), and some near the switch poses `near` (n, 3) of plans that are good already.
+    """
+    fleet, start, goal = query.fleet, query.start, query.goal
+    reach = 1.6 * float(np.median(fleet.radius))
+    local = count // 4 if near else 0
+    driven = (count - local) // 2
+    low = np.minimum(start, goal)[:2] - reach
+    high = np.maximum(start, goal)[:2] + reach
+    free = count - local - driven
+    parts = [np.column_stack([rng.uniform(low, high, (free, 2)), rng.uniform(-np.pi, np.pi, free)])]
+    half = driven // 2
+    for origin, sense, size in ((start, 1.0, half), (goal, -1.0, driven - half)):
+        pushes = rng.integers(fleet.size, size=size)
+        poses = np.broadcast_to(origin, (size, 3))
+        for _ in range(2):
+            poses = compose(poses, exp(sense * _arcs(query, rng, pushes)))
+        parts.append(poses)
+    if local:
+        centres = np.concatenate(near)[rng.integers(sum(map(len, near)), size=local)]
+        spread = np.array([0.2, 0.2, 0.25]) * np.array([np.median(fleet.radius)] * 2 + [1.0])
+        parts.append(centres + spread * rng.normal(size=(local, 3)))
+    return np.concatenate(parts)
+
+
+def pool_seeds(query: Query, poses: Array, legs: int) -> list[Candidate]:
+    """The best sequences of two to `legs` pushes, at most four, whose switch poses are in the pool; cheapest first."""
+    fleet = query.fleet
+    k, sigma = fleet.size, fleet.switching
+    if k < 2 or legs < 2:
+        return []
+    first = query.table(query.start[None], poses)[:, 0, :]  # (k, m)
+    last = query.table(poses, query.goal[None])[:, :, 0]
+    found: list[Way] = []
+    pairs = _pairs(sigma)
+    for i, j in pairs:
+        sums = first[i] + last[j]
+        m = int(np.argmin(sums))
+        found.append((float(sums[m]) + sigma[i, j], (i, j), (m,)))
+    chosen = _keep(found, 2)
+    if legs > 2:
+        inner = _promising(first.min(axis=0), last.min(axis=0), k, query.flat)
+        first, last = first[:, inner], last[:, inner]
+        table = query.table(poses[inner], poses[inner])
+        to_go = []  # of tails (l, n): cost from each pose, and the pose where l ends
+        for a, b in pairs:
+            sums = table[a] + last[b]
+            ends = np.argmin(sums, axis=1)
+            to_go.append(((a, b), np.take_along_axis(sums, ends[:, None], 1)[:, 0] + sigma[a, b], ends))
+        to_go.sort(key=lambda tail: float(np.min(tail[1] + first.min(axis=0))))
+        three: list[Way] = []
+        four: list[Way] = []
+        for (a, b), cost, ends in to_go[:TAILS]:
+            for j in range(k):
+                if j == a or not np.isfinite(sigma[j, a]):
+                    continue
+                sums = table[j] + cost
+                nexts = np.argmin(sums, axis=1)
+                longer = np.take_along_axis(sums, nexts[:, None], 1)[:, 0] + sigma[j, a]
+                both = first[j] + cost
+                m = int(np.argmin(both))
+                three.append((float(both[m]) + sigma[j, a], (j, a, b), (inner[m], inner[ends[m]])))
+                for i in range(k if legs > 3 else 0):
+                    if i == j or not np.isfinite(sigma[i, j]):
+                        continue
+                    both = first[i] + longer
+                    m = int(np.argmin(both))
+                    via = (inner[m], inner[nexts[m]], inner[ends[nexts[m]]])
+                    four.append((float(both[m]) + sigma[i, j], (i, j, a, b), via))
+        chosen += _keep(three, 3) + _keep(four, 4)
+    seeds = [
+        Candidate(cost, np.array(pushes), np.concatenate([[query.start], poses[list(via)], [query.goal]]))
+        for cost, pushes, via in chosen
+    ]
+    return sorted(seeds, key=lambda seed: seed.cost)
+
+
+def arc_seeds(query: Query, rng: np.random.Generator, plain: bool) -> list[Candidate]:
+    """Plans of three arcs, of one push each (if `plain`: they are always the same), and such plans after a random first
+    arc; the cheapest of each sequence.
+
+    Where the best plan has as few arcs as there are equations it is isolated, and a descent hardly finds it.
+    """
+    from .kernels import three_arcs
+
+    fleet, k = query.fleet, query.fleet.size
+    prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
+    pushes = rng.integers(k, size=prefixes)
+    starts = compose(query.start, exp(_arcs(query, rng, pushes)))
+    found: list[tuple[float, tuple[int, ...], Array]] = []
+    costs, poses = np.empty((k, k, k)), np.empty((k, k, k, 2, 3))
+    for prefix in range(-1 if plain else 0, prefixes):
+        first: tuple[int, ...] = () if prefix < 0 else (int(pushes[prefix]),)
+        start = query.start if prefix < 0 else starts[prefix]
+        before = 0.0 if prefix < 0 else query.candidate(pushes[[prefix]], np.array([query.start, start])).cost
+        three_arcs(query.cars, query.laws, fleet.switching, start, query.goal, costs, poses)
+        for flat in np.argsort(costs, axis=None)[: ARC_SEEDS if prefix < 0 else 4]:
+            i, j, h = flat // (k * k), flat // k % k, flat % k
+            cost = before + costs[i, j, h] + (fleet.switching[first[0], i] if first else 0.0)
+            if np.isfinite(cost):
+                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[i, j, h]])
+                found.append((float(cost), (*first, int(i), int(j), int(h)), via))
+    found.sort(key=lambda plan: plan[0])
+    seeds: dict[tuple[int, ...], Candidate] = {}
+    for _, sequence, via in found[: 2 * ARC_SEEDS]:
+        seed = query.merged(np.array(sequence), np.concatenate([[query.start], via, [query.goal]]))
+        if seed.key not in seeds:
+            seeds[seed.key] = seed
+    return list(seeds.values())[:ARC_SEEDS]
+
+
+def _arcs(query: Query, rng: np.random.Generator, pushes: np.ndarray) -> Array:
+    """One random arc of each push, as a body displacement's logarithm, shape (n, 3)."""
+    fleet, n = query.fleet, len(pushes)
+    motion = rng.integers(3, size=n)
+    turn = np.where(motion == 0, 1.0, -1.0) * rng.exponential(0.6, n)
+    centre = np.where((motion == 0)[:, None], fleet.left[pushes], fleet.right[pushes])
+    about = np.column_stack([turn * centre[:, 1], -turn * centre[:, 0], turn])
+    way = rng.exponential(0.7, n) * fleet.radius[pushes]
+    along = np.column_stack([way[:, None] * fleet.direction[pushes], np.zeros(n)])
+    return np.where((motion == 1)[:, None], along, about)
+
+
+def _pairs(sigma: Array) -> list[tuple[int, int]]:
+    k = len(sigma)
+    return [(i, j) for i in range(k) for j in range(k) if i != j and np.isfinite(sigma[i, j])]
+
+
+def _promising(first: Array, last: Array, k: int, flat: bool) -> np.ndarray:
+    """Indices of poses that lie well between start and goal, or near either."""
+    size = int(min(len(first), np.sqrt(MOST_SUMS / (k * (k + TAILS)))))
+    size = min(size, 260 if flat else int(np.sqrt(MOST_CELLS / k)))
+    if size >= len(first):
+        return np.arange(len(first))
+    order = [
+        np.argsort(first + last, kind="stable"),
+        np.argsort(first, kind="stable"),
+        np.argsort(last, kind="stable"),
+    ]
+    picked = np.concatenate([order[0][: size // 2], order[1][: size // 4], order[2][: size // 4]])
+    return np.unique(picked)
+
+
+def _keep(found: list[Way], legs: int) -> list[Way]:
+    return sorted(found)[: QUOTAS[legs]]

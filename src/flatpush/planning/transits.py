@@ -1,0 +1,206 @@
+"""How the pusher gets from one contact to the next: over the object, or around it on the table."""
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..contact import Placement
+from ..errors import FlatpushError
+from ..geometry import Outline, compose, inverse, transform, wrap_angle
+from ..geometry.pose import Array
+from ..problem import Pusher, Scene, TransitSegment
+from .segments import SAG, SAG_ANGLE
+from .timing import Trapezoid
+
+# On the table the fingers keep at least this distance from the object while they go around it [m].
+LEAST_GAP = 0.001
+ARC_SEGMENTS = 8  # of a quarter of the way around a corner
+# Chords of a rounded corner cut into the exact offset; widening the offset by this factor makes up for it.
+WIDER = 1 / np.cos(np.pi / (4 * ARC_SEGMENTS))
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Straight stretches of the pusher beside an object at rest: poses X_OE (n, 3) and heights (n,), from rest to rest.
+
+    Attributes:
+        reach: distance of the fingertips from E [m]; turning by an angle moves them by angle × reach.
+    """
+
+    poses: Array
+    heights: Array
+    reach: float
+
+    @property
+    def lengths(self) -> Array:
+        """Way of the fastest fingertip on each stretch, at most, shape (n - 1,) [m]."""
+        step = np.diff(self.poses, axis=0)
+        flat = np.hypot(step[:, 0], step[:, 1]) + np.abs(step[:, 2]) * self.reach
+        return np.hypot(flat, np.diff(self.heights))
+
+    @property
+    def pusher_length(self) -> float:
+        """Length of the way of E's origin, heights included [m]."""
+        step = np.column_stack([np.diff(self.poses[:, :2], axis=0), np.diff(self.heights)])
+        return float(np.sum(np.linalg.norm(step, axis=1)))
+
+    def duration(self, pusher: Pusher) -> float:
+        """Time from rest to rest on every stretch [s]."""
+        return float(
+            sum(
+                Trapezoid.along(float(n), np.inf, pusher.speed, pusher.acceleration).duration
+                for n in self.lengths
+            )
+        )
+
+    def reversed(self) -> "Way":
+        return Way(self.poses[::-1].copy(), self.heights[::-1].copy(), self.reach)
+
+    def segment(self, pusher: Pusher, X_WO: Array) -> TransitSegment:
+        """The way beside an object at a pose, timed."""
+        times, poses, heights = [np.zeros(1)], [self.poses[:1]], [self.heights[:1]]
+        clock = 0.0
+        for i, length in enumerate(self.lengths):
+            law = Trapezoid.along(float(length), np.inf, pusher.speed, pusher.acceleration)
+            turn = abs(float(self.poses[i + 1, 2] - self.poses[i, 2]))
+            steps = [np.sqrt(8 * SAG / pusher.acceleration)]
+            if turn > 0:
+                steps.append(np.sqrt(8 * SAG_ANGLE * float(length) / turn / pusher.acceleration))
+            t, f = law.samples(float(min(steps)), 1)
+            times.append(clock + t[1:])
+            poses.append(self.poses[i] + f[1:, None] * (self.poses[i + 1] - self.poses[i]))
+            heights.append(self.heights[i] + f[1:] * (self.heights[i + 1] - self.heights[i]))
+            clock += law.duration
+        return TransitSegment(
+            np.concatenate(times), compose(X_WO, np.concatenate(poses)), np.concatenate(heights)
+        )
+
+
+class Transits:
+    """The pusher's ways around one object, in O.
+
+    Args:
+        scene: whose object, pusher and clearance hold.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.pusher, self.outline = scene.pusher, scene.object.outline
+        self.gap = max(scene.planning.clearance, LEAST_GAP)
+
+    def landing(self, placement: Placement) -> Way:
+        """From above the landing place (planar: from beside) onto the contact, straight along the push direction."""
+        back = self._back(placement)
+        poses, heights = [back, placement.pose], [0.0, 0.0]
+        if self.pusher.transit == "lift":
+            poses, heights = [back, *poses], [self.pusher.lift, *heights]
+        return Way(np.array(poses), np.array(heights), self._reach(placement))
+
+    def between(self, first: Placement, second: Placement) -> Way:
+        """From one contact to another.
+
+        Raises:
+            FlatpushError: if there is no way on the table.
+        """
+        reach = max(self._reach(first), self._reach(second))
+        a, b = self._back(first), self._back(second)
+        turn = float(wrap_angle(b[2] - a[2]))
+        b = np.array([b[0], b[1], a[2] + turn])
+        end = np.array([*second.pose[:2], b[2]])
+        if self.pusher.transit == "lift":
+            up = self.pusher.lift
+            over = np.array([first.pose, a, a, b, b, end])
+            return Way(over, np.array([0.0, 0.0, up, up, 0.0, 0.0]), reach)
+        away, before = self._clear(first, reach), self._clear(second, reach)
+        points = self._around(away[:2], before[:2], reach)
+        steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        share = steps / steps[-1] if steps[-1] > 0 else np.linspace(0, 1, len(points))
+        middle = np.column_stack([points, a[2] + turn * share])
+        poses = np.concatenate([[first.pose], middle, [end]])
+        return Way(poses, np.zeros(len(poses)), reach)
+
+    def _back(self, placement: Placement) -> Array:
+        return compose(placement.pose, [-self.pusher.approach, 0.0, 0.0])
+
+    def _reach(self, placement: Placement) -> float:
+        return float(np.max(np.linalg.norm(placement.tips - placement.pose[:2], axis=1)))
+
+    def _clear(self, placement: Placement, reach: float) -> Array:
+        """Straight back from a contact until the hand may turn freely beside the object."""
+        need = WIDER * (reach + self.pusher.tip_radius + self.gap)
+        tips = transform(inverse(placement.pose), placement.tips)
+        distance, pose = 0.0, placement.pose
+        while self.outline.nearest(pose[:2]).distance < need + 1e-9:
+            distance += 0.25 * self.gap + max(0.0, 0.5 * (need - self.outline.nearest(pose[:2]).distance))
+            if distance > 4 * self.outline.size + 2 * need:
+                raise FlatpushError("the fingers cannot back away from the object far enough to turn")
+            pose = compose(placement.pose, [-distance, 0.0, 0.0])
+        for share in np.linspace(0.0, 1.0, max(2, int(np.ceil(distance / self.gap)) + 1))[1:]:
+            back = compose(placement.pose, [-share * distance, 0.0, 0.0])
+            for tip in transform(back, tips):
+                if self.outline.nearest(tip).distance < self.pusher.tip_radius - 1e-9:
+                    raise FlatpushError("a part of the object is in the fingers' way when they back away")
+        return pose
+
+    @cached_property
+    def _networks(self) -> dict[float, "_Network"]:
+        return {}
+
+    def _around(self, a: Array, b: Array, reach: float) -> Array:
+        radius = reach + self.pusher.tip_radius + self.gap
+        if radius not in self._networks:
+            self._networks[radius] = _Network(self.outline, radius)
+        return self._networks[radius].shortest(a, b)
+
+
+class _Network:
+    """Shortest ways around an outline that is widened by a radius: straight between its convex corners."""
+
+    def __init__(self, outline: Outline, radius: float) -> None:
+        import shapely
+
+        self.shapely: Any = shapely
+        wide = WIDER * radius
+        shape = shapely.Polygon(outline.polyline()).buffer(wide, quad_segs=ARC_SEGMENTS)
+        ring = np.array(shape.exterior.coords)[:-1]
+        self.inside = shapely.Polygon(ring).buffer(-1e-6 * wide)
+        shapely.prepare(self.inside)
+        hull = np.array(shapely.Polygon(ring).convex_hull.exterior.coords)[:-1]
+        self.corners = ring if len(ring) <= 200 else hull
+        self.graph = self._visible(self.corners, self.corners)
+
+    def _visible(self, first: Array, second: Array) -> Array:
+        """Distances between points that see each other, inf between others, shape (n, m)."""
+        pairs = np.stack(np.broadcast_arrays(first[:, None], second[None, :]), axis=2)
+        lines = self.shapely.linestrings(pairs.reshape(-1, 2, 2))
+        blocked = self.shapely.intersects(self.inside, lines).reshape(len(first), len(second))
+        distance = np.linalg.norm(first[:, None] - second[None, :], axis=-1)
+        return np.where(blocked, np.inf, distance)
+
+    def shortest(self, a: Array, b: Array) -> Array:
+        """The points of the shortest way from a to b, shape (n, 2)."""
+        direct = self._visible(a[None], b[None])[0, 0]
+        if np.isfinite(direct):
+            return np.stack([a, b])
+        from_a, to_b = self._visible(a[None], self.corners)[0], self._visible(self.corners, b[None])[:, 0]
+        cost, before = from_a.copy(), np.full(len(self.corners), -1)
+        heap = [(c, int(i)) for i, c in enumerate(cost) if np.isfinite(c)]
+        heapq.heapify(heap)
+        while heap:
+            c, i = heapq.heappop(heap)
+            if c > cost[i]:
+                continue
+            shorter = c + self.graph[i] < cost - 1e-15
+            for j in np.flatnonzero(shorter):
+                cost[j], before[j] = c + self.graph[i, j], i
+                heapq.heappush(heap, (float(cost[j]), int(j)))
+        last = int(np.argmin(cost + to_b))
+        if not np.isfinite(cost[last] + to_b[last]):
+            raise FlatpushError("there is no way around the object on the table")
+        points, i = [b], last
+        while i >= 0:
+            points.append(self.corners[i])
+            i = int(before[i])
+        return np.array([a, *points[:0:-1], b])

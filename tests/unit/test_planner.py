@@ -1,0 +1,75 @@
+"""Plans of many pushes from many starts."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from tests.conftest import final_error
+
+import flatpush as fp
+from flatpush.errors import InputError
+
+STARTS = [(0.06, 0.02, 2.6), (0.02, -0.03, 1.57), (-0.05, 0.04, -2.0)]
+
+
+@pytest.fixture(scope="module")
+def planner(rectangle):
+    scene = fp.Scene(rectangle, STARTS[0], pusher=fp.Pusher(fingers=2, spacing=0.018))
+    return fp.Planner(scene)
+
+
+def test_levels_never_get_worse(planner):
+    for start in STARTS:
+        found = planner.plan(start)
+        assert found.scene.start == pytest.approx(start)
+        assert found.cost <= found.run["graph_cost"] * (1 + 1e-9)
+        assert found.run["graph_cost"] <= found.run["single_cost"] * (1 + 1e-9)
+        assert fp.verify(found).ok, fp.verify(found).failed
+        distance, turn = final_error(fp.simulate(found), found.scene.goal)
+        assert distance < 1e-8
+        assert turn < 1e-8
+
+
+def test_improving_gives_an_answer_at_once_and_then_better_ones(planner):
+    costs = [found.cost for found in planner.improving(STARTS[0])]
+    assert len(costs) >= 2
+    assert all(b < a for a, b in pairwise(costs))
+    assert planner.plan(STARTS[0]).cost == costs[-1]
+
+
+def test_a_batch_is_its_single_plans(planner):
+    batch = planner.plans(STARTS[:2])
+    assert [found.cost for found in batch] == [planner.plan(start).cost for start in STARTS[:2]]
+
+
+def test_the_tree_is_kept_in_a_file(planner, tmp_path):
+    file = tmp_path / "tree"
+    first = fp.Planner(planner.scene, tree=file).plan()
+    assert file.exists()
+    before = file.read_bytes()
+    second = fp.Planner(planner.scene, tree=file).plan(STARTS[1])
+    assert file.read_bytes() == before
+    assert first.cost == planner.plan(STARTS[0]).cost
+    assert second.cost == planner.plan(STARTS[1]).cost
+    other = replace(planner.scene, goal=(0.01, 0.0, 0.0))
+    with pytest.raises(InputError, match="tree"):
+        fp.Planner(other, tree=file).plan()
+    file.write_bytes(before[:100])
+    with pytest.raises(InputError, match=file.name):
+        fp.Planner(planner.scene, tree=file).plan()
+
+
+def test_robust_plans_cost_little_more_and_replan_cheaply(planner):
+    robust = fp.Planner(replace(planner.scene, planning=replace(planner.scene.planning, robust=True)))
+    for start in STARTS[:2]:
+        nominal, careful = planner.plan(start), robust.plan(start)
+        assert careful.run["replanning_cost"] <= nominal.run["replanning_cost"] * (1 + 1e-9)
+        assert careful.cost <= 1.1 * nominal.cost
+
+
+def test_every_refused_push_has_its_reason(triangle):
+    pushes = tuple(fp.Push(f"off {k}", triangle.outline.at(2, x)) for k, x in enumerate((0.1, 0.95)))
+    found = fp.plan(fp.Scene(triangle, STARTS[0], pushes=pushes))
+    assert found.status == "no_plan"
+    for push in pushes:
+        assert f"{push.name}: the friction cone does not strictly contain" in found.reason
