@@ -49,7 +49,7 @@ def command(
         from ..view import check_figure
 
         check_figure(figure)
-    with telling("planning"):
+    with telling("planning (the first run compiles for some seconds)"):
         found = Planner(asked, tree).plan()
     if found.status != "solved":
         if as_json:

@@ -12,6 +12,7 @@ from .timing import Trapezoid
 
 # Straight interpolation between samples stays within these [m, rad]: half of what the plan document promises.
 SAG, SAG_ANGLE = 2e-5, 4e-4
+NOTHING = 1e-10  # arcs of a smaller angle [rad] or length [m] are left out
 TURNS = {"L": "left", "S": "straight", "R": "right"}
 
 
@@ -30,14 +31,25 @@ def arcs_of(car: Car, word: str, parameters: Array, fingers: Array) -> list[ArcG
     """The arcs of a word: angles [rad] of turns, lengths [m] of straight motions; arcs of no length are left out."""
     twists = {"L": car.left, "S": car.straight, "R": car.right}
     reaches = dict(zip("LSR", tip_radii(car, fingers), strict=True))
-    found = []
-    for letter, value in zip(word, parameters, strict=True):
+    found: list[ArcGeometry] = []
+    for letter, value in _joined(word, parameters):
         flat = float(value) * (car.radius if letter != "S" else 1.0)
-        if flat <= 1e-12:
-            continue
         reach = float(reaches[letter])
         length = float(value) * (1.0 if letter == "S" else reach)
         found.append(ArcGeometry(TURNS[letter], flat * twists[letter], length, reach, flat))
+    return found
+
+
+def _joined(word: str, parameters: Array) -> list[tuple[str, float]]:
+    """Letters and amounts; equal turns that follow each other, with nothing between them, become one."""
+    found: list[tuple[str, float]] = []
+    for letter, value in zip(word, parameters, strict=True):
+        if value <= NOTHING:
+            continue
+        if found and found[-1][0] == letter:
+            found[-1] = (letter, found[-1][1] + float(value))
+        else:
+            found.append((letter, float(value)))
     return found
 
 
