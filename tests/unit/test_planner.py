@@ -37,6 +37,13 @@ def test_improving_gives_an_answer_at_once_and_then_better_ones(planner):
     assert planner.plan(STARTS[0]).cost == costs[-1]
 
 
+def test_one_start_needs_no_tree_and_ends_up_as_good(planner):
+    for start in STARTS:
+        alone = fp.plan(replace(planner.scene, start=start))
+        assert alone.run["graph_cost"] is None
+        assert alone.cost == pytest.approx(planner.plan(start).cost, rel=0.005)
+
+
 def test_a_batch_is_its_single_plans(planner):
     batch = planner.plans(STARTS[:2])
     assert [found.cost for found in batch] == [planner.plan(start).cost for start in STARTS[:2]]

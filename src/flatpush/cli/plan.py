@@ -50,7 +50,7 @@ def command(
 
         check_figure(figure)
     with telling("planning (the first run compiles for some seconds)"):
-        found = Planner(asked, tree).plan()
+        found = Planner(asked, tree or False).plan()
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))

@@ -51,7 +51,8 @@ class Planner:
 
     Args:
         scene: its start is the default start of plan().
-        tree: file of a search tree: read if it exists, written if not. Without it a cache keyed by content is used.
+        tree: whether a search tree towards the goal is built to start the search from (kept in a cache keyed by
+            content), or the file to keep it in: read if it exists, else written. For one start it does not pay.
 
     Attributes:
         scene: with its pushes listed.
@@ -65,7 +66,7 @@ class Planner:
     [True, True]
     """
 
-    def __init__(self, scene: Scene, tree: str | Path | None = None) -> None:
+    def __init__(self, scene: Scene, tree: bool | str | Path = True) -> None:
         if scene.planning.two_finger == "cone":
             raise InputError(
                 "two_finger: cone, the true composite cone, is not available yet",
@@ -80,7 +81,7 @@ class Planner:
         self.scene = scene
         self.options = push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
-        self.tree_file = None if tree is None else Path(tree)
+        self._tree = tree
 
     @property
     def freedom(self) -> Freedom:
@@ -168,7 +169,8 @@ class Planner:
         from .refine import improvements
 
         planning = scene.planning
-        seeds = query(self.tree, scene.start_pose, SEEDS)
+        # Among obstacles the ways of the tree are also alternatives where better ones are blocked.
+        seeds = query(self.tree, scene.start_pose, SEEDS) if self._tree or _crowded(scene) else []
         if _crowded(scene) and not planning.robust:
             for way in seeds:
                 yield (
@@ -188,7 +190,7 @@ class Planner:
         for done, refined in enumerate(search):
             found = {
                 "single_cost": single,
-                "graph_cost": seeds[0].cost,
+                "graph_cost": seeds[0].cost if seeds else None,
                 "cost_before_refinement": refined.cost_before,
                 "replanning_cost": refined.replanning_cost,
                 "rounds": done,
@@ -221,7 +223,8 @@ class Planner:
         while region < np.max(np.abs((scene.start_pose - scene.goal_pose)[:2])):
             region *= 2
         poses = pose_samples(SAMPLES, scene.goal_pose, region, scene.planning.seed)
-        return stored_tree(self.fleet, poses, scene.goal_pose, self.tree_file)
+        file = None if isinstance(self._tree, bool) else self._tree
+        return stored_tree(self.fleet, poses, scene.goal_pose, file)
 
     def _legs(self, pushes: Sequence[int], poses: Array) -> list[Leg]:
         """Legs between given poses, each with its cheapest word."""
@@ -349,7 +352,7 @@ def plan(scene: Scene) -> Plan:
     Returns:
         a Plan; where there is none, status "no_plan" and the reason of each push.
     """
-    return Planner(scene).plan()
+    return Planner(scene, tree=False).plan()
 
 
 def _car(option: PushOption) -> Car:
