@@ -91,6 +91,7 @@ def test_describe_tells_why_a_push_cannot_steer(folder):
     assert "cannot steer" in described.stdout
     assert "turning radius" in described.stdout
     assert "exact, uniform" in described.stdout
+    assert "no push can steer the object" in described.stdout
     assert (folder / "cones.svg").read_text().startswith("<?xml")
 
 

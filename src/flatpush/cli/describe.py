@@ -16,7 +16,7 @@ def command(
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
     from ..documents import check_writable, load_scene
-    from ..planning import describe
+    from ..planning import describe, freedom
     from ..planning.description import turning_radii
 
     asked = load_scene(scene)
@@ -34,6 +34,7 @@ def command(
         "friction": asked.object.friction,
         "centre_of_friction": [float(x) for x in asked.object.cof],
         "second_moments": [[float(x) for x in row] for row in asked.object.support.covariance],
+        "freedom": freedom([p.option.car for p in pushes if p.option.car is not None]),
         "pushes": [_push(p, turning_radii(p)) for p in pushes],
     }
     if as_json:
@@ -71,6 +72,8 @@ def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
 
 
 def _tell(data: dict[str, Any]) -> None:
+    from ..planning.freedom import WORDS
+
     mm = 1000.0
     cof, moments = data["centre_of_friction"], data["second_moments"]
     typer.echo(f"{data['object']}: friction between finger and object μ = {data['friction']}")
@@ -79,6 +82,7 @@ def _tell(data: dict[str, Any]) -> None:
         f"second moments of the pressure xx {mm * mm * moments[0][0]:.1f}, yy {mm * mm * moments[1][1]:.1f},"
         f" xy {mm * mm * moments[0][1]:.1f} mm²"
     )
+    typer.echo(WORDS[data["freedom"]])
     for push in data["pushes"]:
         at = push["at"]
         typer.echo(f"\npush {push['name']} at ({mm * at[0]:.2f}, {mm * at[1]:.2f}) mm")
