@@ -38,7 +38,7 @@ def run(folder: Path | None = None) -> str:
     """The table: case, model, end from arcs, end from samples."""
     lines = [
         "Open loop, one finger, simulated on the exact surface: distance and angle off the goal.",
-        f"{'case':<24} {'model':<10} {'word':>5} {'growth':>8} {'from arcs':>22} {'from samples':>22}",
+        f"{'case':<24} {'model':<10} {'words':>9} {'growth':>8} {'from arcs':>22} {'from samples':>22}",
     ]
     for name, scene in cases():
         for model in MODELS:
@@ -53,8 +53,9 @@ def run(folder: Path | None = None) -> str:
                 error = pose_error(rollout.final_pose, scene.goal)
                 text = f"{1000 * np.hypot(*error[:2]):9.4f} mm {np.rad2deg(abs(error[2])):7.4f}°"
                 ends.append(text if rollout.outcome == "completed" else rollout.outcome)
+            words = " ".join(push.word for push in found.pushes)
             lines.append(
-                f"{name:<24} {model:<10} {found.pushes[0].word:>5} {found.certificate.growth:8.1f}"
+                f"{name:<24} {model:<10} {words:>9} {found.certificate.growth:8.1f}"
                 f" {ends[0]:>22} {ends[1]:>22}"
             )
     return "\n".join(lines)
