@@ -13,7 +13,7 @@ from flatpush.contact import (
 )
 from flatpush.contact.placement import travel
 from flatpush.errors import InputError, NoDubinsReduction
-from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Support
+from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Support, local_ellipsoid
 from flatpush.geometry import Outline, perpendicular, rotate, velocity_at
 
 ISOTROPIC = Ellipsoid(np.diag([1.0, 1.0, 4.0]))
@@ -134,6 +134,15 @@ def test_collinear_feet_are_not_steered_by_a_push_square_to_their_line():
         steering_forces(PointContact([0.0, -0.02], [0.0, 1.0], 0.3), surface, 0.1)
     along = PointContact([-0.03, 0.0], [1.0, 0.0], 0.3)
     assert steering_forces(along, surface, 0.1)[1] == pytest.approx([1.0, 0.0])
+
+
+def test_collinear_feet_have_no_local_model_square_to_their_line():
+    """A division by zero, once: plans for two feet fell over their pushes square to the feet's line."""
+    with pytest.warns(CollinearSupportWarning):
+        support = Support.points([(-0.02, 0.0), (0.02, 0.0)], [1, 1])
+    with pytest.raises(InputError, match="no local model"):
+        local_ellipsoid(support, [0.0, 1.0])
+    assert local_ellipsoid(support, [1.0, 0.0]).matrix[2, 2] == pytest.approx(1 / 0.0004)
 
 
 @pytest.mark.parametrize("edge", ["left", "right", "above", "below"])

@@ -28,7 +28,8 @@ def local_ellipsoid(surface: Support | LimitSurface, direction: ArrayLike) -> El
     [1.0, 1.0, 3.0]
 
     Raises:
-        InputError: if the direction is zero, or the surface is of another kind.
+        InputError: if the direction is zero, the surface is of another kind, or a support has no extent along the
+            direction.
     """
     n = np.asarray(direction, dtype=float)
     if n.shape != (2,) or not np.isfinite(n).all() or not np.any(n):
@@ -37,7 +38,12 @@ def local_ellipsoid(surface: Support | LimitSurface, direction: ArrayLike) -> El
     if isinstance(surface, Exact):
         surface = surface.support
     if isinstance(surface, Support):
-        return Ellipsoid(np.diag([1.0, 1.0, 1 / float(n @ surface.covariance @ n)]))
+        rho = float(n @ surface.covariance @ n)
+        if rho <= 1e-12 * float(np.trace(surface.covariance)):
+            raise InputError(
+                "the support points lie on a line square to the push: it has no local model", value=direction
+            )
+        return Ellipsoid(np.diag([1.0, 1.0, 1 / rho]))
     if isinstance(surface, Ellipsoid):
         H = surface.matrix
     elif isinstance(surface, Quartic):

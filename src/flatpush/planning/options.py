@@ -4,13 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact import Placement
+from ..contact import Placement, two_point_sticks
 from ..errors import FlatpushError, InputError
-from ..geometry import transform
+from ..geometry import shift_twist, transform
 from ..problem import Push, Scene
-from ..problem.mechanics import placement_of, surface_of, virtual_contact
+from ..problem.mechanics import contacts_of, placement_of, surface_of, true_surface, virtual_contact
 from ..problem.scene import Model
 from ..steering.car import Car
+
+SLACK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,7 @@ def push_option(
             pusher=placement.pose,
             margin=scene.planning.friction_margin if margin is None else margin,
         )
+        _check_composite(scene, placement, car, model or scene.planning.model)
     except FlatpushError as error:
         return PushOption(push, placement, None, str(error))
     return PushOption(push, placement, car)
@@ -52,6 +55,29 @@ def push_options(scene: Scene) -> tuple[PushOption, ...]:
     if scene.pushes == "auto":
         raise InputError("the pushes are not listed yet", key="pushes", hint="See automatic_pushes.")
     return tuple(push_option(scene, push) for push in scene.pushes)
+
+
+def _check_composite(scene: Scene, placement: Placement, car: Car, model: Model) -> None:
+    """Two fingers must be able to make every motion of the car together, if its model is what the table does.
+
+    Under parallel normals they always can; on curved sides the virtual contact between them may promise too much.
+    """
+    if len(placement.tips) == 1 or model != "exact":
+        return
+    contacts, surface = contacts_of(scene, placement), true_surface(scene.object)
+    for name, twist in (
+        ("left turn", car.left),
+        ("straight motion", car.straight),
+        ("right turn", car.right),
+    ):
+        inside = (
+            twist * (1 - SLACK) + car.straight * SLACK
+        )  # the edges of a car without margin lie on the cone
+        if not two_point_sticks(contacts, surface, shift_twist(inside, scene.object.cof)):
+            raise FlatpushError(
+                f"its {name} needs more friction than the two fingers have together; more margin or a flatter place"
+                " would help"
+            )
 
 
 def _check_landing(scene: Scene, placement: Placement) -> None:

@@ -70,8 +70,10 @@ def surface_of(thing: Object, model: Model, direction: Array) -> LimitSurface:
 
 
 def local_rho(thing: Object, direction: Array) -> float:
-    """ρ = a/b of the local model about a straight push [m²]; from the support's pressure, nᵀΣn (methods 1.5)."""
-    matrix = local_ellipsoid(true_surface(thing), direction).matrix
+    """ρ = a/b of the local model about a straight push along a unit direction [m²]; of a support's pressure, nᵀΣn."""
+    if thing.surface is None:
+        return float(direction @ thing.support.covariance @ direction)
+    matrix = local_ellipsoid(thing.surface, direction).matrix
     return float(matrix[0, 0] / matrix[2, 2])
 
 

@@ -8,7 +8,7 @@ from ..contact import ContactMode, PointContact, two_point_sticks
 from ..contact.placement import SMOOTH_CORNER
 from ..errors import InputError
 from ..friction.surface import LimitSurface
-from ..geometry import compose, inverse, perpendicular, relative, rotate, shift_twist, transform
+from ..geometry import compose, exp, inverse, perpendicular, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
 from ..problem import Object, Plan, Rollout, Scene
 from ..problem.mechanics import contacts_of, named, placement_of, surface_of, virtual_contact
@@ -205,8 +205,8 @@ class _Run:
                 self.outcome = "passed a corner"
         return found.distance - self.scene.pusher.tip_radius, point, normal, tip
 
-    def _velocity(self, q: Array, piece: Piece, fraction: float) -> tuple[Array, ContactMode]:
-        """Velocity (x, y, θ) of the object in W per whole piece, and the contact mode."""
+    def _twist(self, q: Array, piece: Piece, fraction: float) -> tuple[Array, ContactMode]:
+        """Body twist of the object in O per whole piece, and the contact mode."""
         pusher, velocity = piece.pusher_at(fraction), piece.pusher_velocity(fraction)
         _, point, normal, tip = self._contact(q, pusher[:2])
         lever = rotate(q[2], point - tip)
@@ -214,23 +214,37 @@ class _Run:
         cof = self.scene.object.cof
         contact = PointContact(point - cof, normal, self.scene.object.friction, hook=True)
         motion = contact.motion(self.surface, u)
-        V = shift_twist(motion.twist, -cof)
-        return np.array([*rotate(q[2], V[:2]), V[2]]), motion.mode
+        return shift_twist(motion.twist, -cof), motion.mode
 
     def _step(self, piece: Piece, low: float, high: float) -> ContactMode:
+        """A step of the fourth-order Runge-Kutta-Munthe-Kaas method: exact where the twist is constant."""
         h, q = high - low, self.q
-        k1, mode = self._velocity(q, piece, low)
+        twist, mode = self._twist(q, piece, low)
         if mode is ContactMode.SEPARATION or mode is ContactMode.REST:
             return mode
-        k2, _ = self._velocity(q + 0.5 * h * k1, piece, low + 0.5 * h)
-        k3, _ = self._velocity(q + 0.5 * h * k2, piece, low + 0.5 * h)
-        k4, mode_end = self._velocity(q + h * k3, piece, high)
-        self.q = q + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        slopes = [twist]
+        for part in (0.5, 0.5, 1.0):
+            moved = part * h * slopes[-1]
+            twist, mode_end = self._twist(compose(q, exp(moved)), piece, low + part * h)
+            slopes.append(_slope(moved, twist))
+        k1, k2, k3, k4 = slopes
+        self.q = compose(q, exp(h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))
         gap, _, normal, _ = self._gap(piece, high)
         if mode_end is not ContactMode.SEPARATION and abs(gap) < 0.1 * STEP:
             # Remove the drift off the outline that the step's error leaves.
             self.q = self.q - np.array([*(gap * rotate(self.q[2], normal)), 0.0])
         return mode
+
+
+def _slope(moved: Array, twist: Array) -> Array:
+    """Rate of the displacement's logarithm when the body, displaced by exp(moved), has a body twist."""
+    first = _bracket(moved, twist)
+    return twist + 0.5 * first + _bracket(moved, first) / 12
+
+
+def _bracket(a: Array, b: Array) -> Array:
+    """The Lie bracket of two plane twists."""
+    return np.array([*(a[2] * perpendicular(b[:2]) - b[2] * perpendicular(a[:2])), 0.0])
 
 
 def _with_friction(scene: Scene, friction: float) -> Object:
