@@ -3,11 +3,14 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.errors import InputError
+from flatpush.planning.assembly import Leg, assemble, costs, words_of
+from flatpush.simulation import certify
 
 STARTS = [(0.06, 0.02, 2.6), (0.02, -0.03, 1.57), (-0.05, 0.04, -2.0)]
 
@@ -80,3 +83,37 @@ def test_every_refused_push_has_its_reason(triangle):
     assert found.status == "no_plan"
     for push in pushes:
         assert f"{push.name}: the friction cone does not strictly contain" in found.reason
+
+
+@pytest.mark.parametrize("fingers", [1, 2])
+def test_a_push_that_follows_itself_does_not_let_go(rectangle, fingers):
+    """Words of general cars may be cheaper in two legs of one push; there is no transit and no cost between them."""
+    pusher = fp.Pusher(fingers=2, spacing=0.018) if fingers == 2 else fp.Pusher()
+    scene = fp.Scene(rectangle, (0.0, -0.06, 0.2), pusher=pusher)
+    planner = fp.Planner(scene, tree=False)
+    option = planner.usable[-1]
+    legs = []
+    here = scene
+    for goal in ((0.002, -0.03, 0.1), (0.0, 0.0, 0.0)):
+        here = replace(here, goal=goal)
+        word = words_of(here, option)[int(np.argmin(costs(here, option)))]
+        legs.append(Leg(option, word.word, word.parameters, np.array(goal)))
+        here = replace(here, start=goal)
+    segments = assemble(planner.scene, planner.transits, legs)
+    assert [segment.kind for segment in segments] == ["transit", "push", "push", "transit"]
+    certificate = certify(planner.scene, segments)
+    found = fp.Plan(
+        "solved",
+        planner.scene,
+        certificate["cost"],
+        certificate["duration"],
+        segments,
+        fp.Certificate(certificate),
+    )
+    assert fp.verify(found).ok, fp.verify(found).failed
+    assert certificate["cost"] == pytest.approx(sum(arc.cost for push in found.pushes for arc in push.arcs))
+    rollout = fp.simulate(found)
+    assert rollout.outcome == "completed"
+    distance, turn = final_error(rollout, scene.goal)
+    assert distance < 5e-5
+    assert turn < 1e-3

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,39 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import FlatpushError, InputError
-from ..geometry import pose_error, relative
+from ..geometry import pose_error
 from ..geometry.pose import Array
-from ..problem import Certificate, Plan, PushSegment, Scene, TransitSegment
+from ..problem import Certificate, Plan, Scene
 from ..simulation import certify, clearance_of
-from ..steering.car import Car
 from ..steering.fleet import Fleet
-from ..steering.three_twist import words
+from .assembly import Leg, Segments, assemble, car_of, costs, words_of
 from .candidates import automatic_pushes
+from .fleets import fleet_of
 from .freedom import Freedom, freedom
 from .options import PushOption, push_options
-from .rolling import rolling_segment
-from .segments import ArcGeometry, arc_duration, arcs_of, fingertips, push_segment, tip_radii
-from .timing import Trapezoid
-from .transits import Transits, Way
+from .transits import Transits
 
 if TYPE_CHECKING:
     from .graph import Tree
 
-Segments = tuple[PushSegment | TransitSegment, ...]
 # A round of the search counts as this many of the scene's iterations.
 ROUND = 3300
 # Poses of the search tree, and how many of its ways are refined.
 SAMPLES, SEEDS = 1500, 30
-
-
-@dataclass(frozen=True, eq=False)
-class Leg:
-    """One push of a plan before it is timed: which one, and its arcs."""
-
-    option: PushOption
-    word: str
-    amounts: Array
-    goal: Array
 
 
 class Planner:
@@ -85,7 +71,7 @@ class Planner:
 
     @property
     def freedom(self) -> Freedom:
-        return freedom([_car(option) for option in self.usable])
+        return freedom([car_of(option) for option in self.usable])
 
     @property
     def reasons(self) -> dict[str, str]:
@@ -127,7 +113,7 @@ class Planner:
                 continue
             count += 1
             try:
-                segments = self._segments(scene, legs)
+                segments = assemble(scene, self.transits, legs)
             except FlatpushError as error:
                 reasons.setdefault(legs[0].option.push.name, str(error))
                 continue
@@ -153,12 +139,12 @@ class Planner:
             (
                 (cost, i, k)
                 for i, option in enumerate(self.usable)
-                for k, cost in enumerate(self._costs(scene, option))
+                for k, cost in enumerate(costs(scene, option))
             ),
         )
         several = len(self.usable) > 1
         for cost, i, k in singles[:1] if several and not _crowded(scene) else singles:
-            word = self._words(scene, self.usable[i])[k]
+            word = words_of(scene, self.usable[i])[k]
             leg = Leg(self.usable[i], word.word, word.parameters, scene.goal_pose)
             yield cost, (leg,), {"single_cost": singles[0][0]}
         if several:
@@ -232,118 +218,19 @@ class Planner:
         for a, start, goal in zip(pushes, poses[:-1], poses[1:], strict=True):
             option = self.usable[int(a)]
             part = replace(self.scene, start=start, goal=goal)
-            k = int(np.argmin(self._costs(part, option)))
-            word = self._words(part, option)[k]
+            k = int(np.argmin(costs(part, option)))
+            word = words_of(part, option)[k]
             legs.append(Leg(option, word.word, word.parameters, np.asarray(goal)))
         return legs
-
-    def _words(self, scene: Scene, option: PushOption) -> list[Any]:
-        car = _car(option)
-        return words(car.left_centre, car.right_centre, car.direction, scene.start_pose, scene.goal_pose)
-
-    def _costs(self, scene: Scene, option: PushOption) -> list[float]:
-        """The cost of each word of a push from the scene's start to its goal."""
-        return [self._cost(option, word.word, word.parameters) for word in self._words(scene, option)]
-
-    def _cost(self, option: PushOption, word: str, amounts: Array) -> float:
-        car, planning = _car(option), self.scene.planning
-        if planning.cost == "time":
-            tips = fingertips(option.push.fingers, option.push.spacing)
-            return sum(arc_duration(arc, self.scene.pusher) for arc in arcs_of(car, word, amounts, tips))
-        each = dict(zip("LSR", car.weights(planning.cost), strict=True))
-        return sum(each[letter] * float(x) for letter, x in zip(word, amounts, strict=True))
 
     @cached_property
     def transits(self) -> Transits:
         return Transits(self.scene)
 
     @cached_property
-    def _ways(self) -> dict[tuple[str, str], Way | str]:
-        """The pusher's way from each push to each other one, or why there is none."""
-        found: dict[tuple[str, str], Way | str] = {}
-        for a in self.usable:
-            for b in self.usable:
-                if a is b or a.placement is None or b.placement is None:
-                    continue
-                try:
-                    found[a.push.name, b.push.name] = self.transits.between(a.placement, b.placement)
-                except FlatpushError as error:
-                    found[a.push.name, b.push.name] = str(error)
-        return found
-
-    @cached_property
     def fleet(self) -> Fleet:
         """The usable cars as arrays, with the switching costs, the transits' own included where they count."""
-        planning, pusher = self.scene.planning, self.scene.pusher
-        cars = [_car(option) for option in self.usable]
-        k = len(cars)
-        switching = np.full((k, k), planning.switching)
-        for i, a in enumerate(self.usable):
-            for j, b in enumerate(self.usable):
-                if i == j:
-                    switching[i, j] = 0.0
-                    continue
-                way = self._ways[a.push.name, b.push.name]
-                if isinstance(way, str):
-                    switching[i, j] = np.inf
-                elif planning.cost == "pusher":
-                    switching[i, j] += way.pusher_length
-                elif planning.cost == "time":
-                    switching[i, j] += way.duration(pusher)
-        if planning.cost != "time":
-            return Fleet.of(cars, np.array([car.weights(planning.cost) for car in cars]), switching=switching)
-        radii = np.array(
-            [tip_radii(car, fingertips(o.push.fingers, o.push.spacing)) for car, o in self._pairs()]
-        )
-        laws = [
-            [Trapezoid.along(1.0, float(r), pusher.speed, pusher.acceleration) for r in row] for row in radii
-        ]
-        return Fleet.of(
-            cars,
-            np.where(np.isinf(radii), 1.0, radii),
-            np.array([[law.speed for law in row] for row in laws]),
-            np.array([[law.acceleration for law in row] for row in laws]),
-            switching,
-        )
-
-    def _pairs(self) -> list[tuple[Car, PushOption]]:
-        return [(_car(option), option) for option in self.usable]
-
-    def _segments(self, scene: Scene, legs: Sequence[Leg]) -> Segments:
-        """Landing, pushes and transits between them, leaving."""
-        segments: list[PushSegment | TransitSegment] = []
-        pose, hand = scene.start_pose, None
-        for leg in legs:
-            there = leg.option.placement
-            assert there is not None
-            way = self.transits.landing(there) if hand is None else self.transits.between(hand, there)
-            segments.append(way.segment(scene.pusher, pose))
-            push = self._push(scene, leg, pose)
-            segments.append(push)
-            pose = push.object[-1]
-            # Where the fingers now stand on the object; a finger that kept its direction has rolled along.
-            stand = relative(pose, push.pusher[-1])
-            hand = there if scene.pusher.turns else replace(there, pose=stand, tips=stand[None, :2])
-        assert hand is not None
-        segments.append(self.transits.landing(hand).reversed().segment(scene.pusher, pose))
-        return tuple(segments)
-
-    def _push(self, scene: Scene, leg: Leg, start: Array) -> PushSegment:
-        option, car = leg.option, _car(leg.option)
-        tips = fingertips(option.push.fingers, option.push.spacing)
-        part = replace(scene, start=start, goal=leg.goal)
-        # The same word from where the last push really ended: rounding must not change a word that sits on a jump.
-        same = [w for w in self._words(part, option) if w.word == leg.word]
-        near = (
-            min((float(np.max(np.abs(w.parameters - leg.amounts))), k) for k, w in enumerate(same))
-            if same
-            else None
-        )
-        amounts = same[near[1]].parameters if near is not None and near[0] < 1e-6 else leg.amounts
-        arcs: list[ArcGeometry] = arcs_of(car, leg.word, amounts, tips)
-        if not scene.pusher.turns:
-            return rolling_segment(part, option, arcs)
-        return push_segment(part, option.push.name, car, tips, arcs, start)
+        return fleet_of(self.scene, self.usable, self.transits)
 
 
 def plan(scene: Scene) -> Plan:
@@ -353,11 +240,6 @@ def plan(scene: Scene) -> Plan:
         a Plan; where there is none, status "no_plan" and the reason of each push.
     """
     return Planner(scene, tree=False).plan()
-
-
-def _car(option: PushOption) -> Car:
-    assert option.car is not None
-    return option.car
 
 
 def _crowded(scene: Scene) -> bool:
