@@ -2,8 +2,8 @@
 
 tree.plain_tree is the plain twin. Only edges that can still improve something are steered: with push a an edge
 from j to i can lower the cost V(j, a) only if it costs less than V(j, a) - W(i, a), so it is left out where a
-lower bound of cars.py says that it does not. `general` is None for a fleet of Dubins cars with the flat cost,
-which need the first bound only, and `timed` is None without a time law; numba compiles what the fleet at hand
+lower bound of cars.py says that it does not. `general` is None for a fleet of Dubins cars with the flat cost, and
+`timed` is None without a time law, where the first bound alone is fastest; numba compiles what the fleet at hand
 needs.
 """
 
@@ -101,10 +101,9 @@ def grow(
         count = _within(lane[a], open_[a], px, py, frames[a, 4, i], cars[a], w, mask, hits, timed)
         count = _steer(frames[a], cars[a], i, ids[a], lane[a, 2], hits, count, w, out, general, timed)
         for q in range(count):
-            p = hits[q]
-            j = ids[a, p]
-            cost = w + out[q]
-            if cost < V[a, j] and j != i:
+            p, cost = hits[q], w + out[q]
+            if cost < lane[a, 2, p] and ids[a, p] != i:
+                j = ids[a, p]
                 V[a, j], lane[a, 2, p], follow[a, j] = cost, cost, i
                 for b in range(k):
                     copy = b * n + j
@@ -220,7 +219,8 @@ def _steer(
 ) -> int:  # fmt: skip
     """Fills out with the costs of the edges from the poses hits[:count] of a list to pose i.
 
-    Where general, hits that bounds exclude are dropped first; returns how many are left.
+    Where timed, hits that bounds exclude are dropped first; returns how many are left. Without a time law the bound
+    costs more than the edges that it saves.
     """
     _widest_vectors()
     tile, low = np.empty((6, TILE)), np.empty(TILE)
@@ -250,23 +250,23 @@ def _steer(
                 )
             kept += m
         else:
-            way, offset, turning, sigma = car[WAY], car[OFFSET], car[TURNING], car[SIGMA]
-            tilt, fall, side, rise, late = car[TILT], car[FALL], car[SIDE], car[RISE], car[LATE]
-            for q in range(m):
-                bound = _bound(
-                    tile[0, q], tile[1, q], tile[2, q], tile[3, q], tile[4, q], xi, yi, ci, si, hi,
-                    way, offset, turning, sigma, tilt, fall, side, rise,
-                )  # fmt: skip
-                if timed is not None:
-                    bound = _delayed(bound, late)
-                low[q] = bound
-            left = 0
-            for q in range(m):
-                if low[q] < tile[5, q]:
-                    for r in range(6):
-                        tile[r, left] = tile[r, q]
-                    hits[kept + left] = hits[begin + q]
-                    left += 1
+            left = m
+            if timed is not None:
+                way, offset, turning, sigma = car[WAY], car[OFFSET], car[TURNING], car[SIGMA]
+                tilt, fall, side, rise, late = car[TILT], car[FALL], car[SIDE], car[RISE], car[LATE]
+                for q in range(m):
+                    bound = _bound(
+                        tile[0, q], tile[1, q], tile[2, q], tile[3, q], tile[4, q], xi, yi, ci, si, hi,
+                        way, offset, turning, sigma, tilt, fall, side, rise,
+                    )  # fmt: skip
+                    low[q] = _delayed(bound, late)
+                left = 0
+                for q in range(m):
+                    if low[q] < tile[5, q]:
+                        for r in range(6):
+                            tile[r, left] = tile[r, q]
+                        hits[kept + left] = hits[begin + q]
+                        left += 1
             some = out[kept : kept + left]
             for q in range(left):
                 some[q] = three_twist_between(
