@@ -117,3 +117,20 @@ def test_a_push_that_follows_itself_does_not_let_go(rectangle, fingers):
     distance, turn = final_error(rollout, scene.goal)
     assert distance < 5e-5
     assert turn < 1e-3
+
+
+def test_lists_of_pushes_are_checked(triangle):
+    push = fp.Push("below", triangle.outline.at(2, 0.6))
+    with pytest.raises(InputError, match="at least one push"):
+        fp.Scene(triangle, STARTS[0], pushes=())
+    with pytest.raises(InputError, match="name of its own"):
+        fp.Scene(triangle, STARTS[0], pushes=(push, push))
+
+
+def test_no_automatic_push_at_all_is_no_plan_that_can_be_saved(triangle, tmp_path):
+    slippery = fp.Object(triangle.outline, "uniform", friction=0.0)
+    found = fp.plan(fp.Scene(slippery, STARTS[0]))
+    assert found.status == "no_plan"
+    assert "without friction" in found.reason
+    found.save(tmp_path / "plan.json")
+    assert fp.load_plan(tmp_path / "plan.json").reason == found.reason

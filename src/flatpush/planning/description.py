@@ -19,9 +19,8 @@ class PushDescription:
 
     Attributes:
         push: the push; option: its car under the scene's model, or the refusal.
-        cars: car, or refusal in words, under each model and, as "exact, uniform" and "exact, outline", under
-        the support's
-            own surface for uniform pressure and for pressure along the outline.
+        cars: car, or refusal in words, under each model and, as "exact, uniform" and "exact, outline", under the
+            exact surface for uniform pressure and for pressure along the outline.
         divergence: L [m]: a small error of one finger grows e-fold per L of travel; nan without a contact.
     """
 

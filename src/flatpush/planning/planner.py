@@ -63,9 +63,9 @@ class Planner:
         self.left_out: tuple[PushOption, ...] = ()
         if scene.pushes == "auto":
             pushes, self.left_out = automatic_pushes(scene)
-            scene = replace(scene, pushes=pushes)
+            scene = replace(scene, pushes=pushes or "auto")
         self.scene = scene
-        self.options = push_options(scene)
+        self.options = () if scene.pushes == "auto" else push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
         self._tree = tree
 

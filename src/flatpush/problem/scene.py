@@ -210,6 +210,8 @@ class Scene:
                 )
             pose.setflags(write=False)
             object.__setattr__(self, name, pose)
+        if self.pushes != "auto":
+            object.__setattr__(self, "pushes", _checked_pushes(self.pushes))
 
     @property
     def start_pose(self) -> Array:
@@ -229,8 +231,9 @@ def _support(outline: Outline, word: str) -> Support:
     return (Support.polygon if word == "uniform" else Support.outline)(outline.vertices)
 
 
-def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
-    """The pushes as a tuple, checked for names that stand twice."""
+def _checked_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
+    if not pushes:
+        raise InputError("there is at least one push", key="pushes", hint='Or leave it to "auto".')
     names = [push.name for push in pushes]
     for name in names:
         if names.count(name) > 1:

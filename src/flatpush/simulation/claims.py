@@ -37,8 +37,7 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
             lost before the contact slips, under the planning model (two fingers in the middle: the virtual contact).
         friction_margin_degrees: the same as an angle between force and cone edge.
         motion_cone_margin_degrees: angle between the pusher's velocity and the nearer motion-cone edge, or the
-        outline's
-            tangent, beyond which the fingertip leaves.
+            outline's tangent, beyond which the fingertip leaves.
         curvature_margin: 1 - turn per travel of the contact / the most among forces of the whole friction cone.
         composite_margin: two fingers: the fraction of μ that can be lost before a twist leaves the true composite
             cone of both contacts, under the believed surface; null with one finger.

@@ -154,9 +154,8 @@ def build_tree(fleet: Fleet, poses: ArrayLike, goal: ArrayLike) -> Tree:
         goal: of the object, shape (3,).
 
     Raises:
-        InputError: for no push, poses that are not finite, or switching costs that are negative or nan. An
-        infinite one
-            forbids the switch.
+        InputError: for no push, poses that are not finite, or switching costs that are negative or nan. An infinite
+            one forbids the switch.
     """
     from .kernels import grow
 
