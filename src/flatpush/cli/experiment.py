@@ -12,6 +12,9 @@ from .common import print_json, telling
 def command(
     names: Annotated[list[str] | None, typer.Argument(help="Which; without a name, they are listed.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder to draw figures into.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the recorded data, for those that read them.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> int:
     """Run experiments NAMES and print their tables."""
@@ -21,7 +24,7 @@ def command(
         for name, about in EXPERIMENTS.items():
             typer.echo(f"{name:<12} {about}")
         return 0
-    runs = [experiment(name) for name in names]
+    runs = [experiment(name, data) for name in names]
     if figures is not None and not figures.is_dir():
         raise InputError("the folder for figures does not exist", source=str(figures))
     tables = {}

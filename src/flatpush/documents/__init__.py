@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .atomic import check_writable, write_atomically
     from .export import export_csv
+    from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import read_mapping
     from .rollout_file import save_rollouts
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
     from .template import scene_template
 
 __all__ = [
+    "BadRow",
+    "PairsFile",
     "check_writable",
     "export_csv",
+    "load_pairs",
     "load_plan",
     "load_scene",
     "load_surface",
@@ -39,8 +43,11 @@ __all__ = [
 ]
 
 _HOME = {
+    "BadRow": "pairs_file",
+    "PairsFile": "pairs_file",
     "check_writable": "atomic",
     "export_csv": "export",
+    "load_pairs": "pairs_file",
     "load_plan": "plan_file",
     "load_scene": "scene_reader",
     "load_surface": "surface_file",

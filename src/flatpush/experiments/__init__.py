@@ -1,6 +1,8 @@
 """The paper's figures and the project's measurements, one file each; each prints its table and may draw its figure."""
 
+import os
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -10,14 +12,33 @@ EXPERIMENTS = {
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
+    "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
+# Those that need the folder of recorded data.
+RECORDED = {"force-pushes"}
 
 
-def experiment(name: str) -> Callable[[Path | None], str]:
-    """The experiment of a name: a function that takes a folder for figures, or None, and returns its table."""
+def experiment(name: str, data: Path | None = None) -> Callable[[Path | None], str]:
+    """The experiment of a name: a function that takes a folder for figures, or None, and returns its table.
+
+    Args:
+        data: folder of the recorded data; default: that which the environment's FLATPUSH_DATA names.
+
+    Raises:
+        InputError: if there is no such experiment, or it needs recorded data and they are not there.
+    """
     if name not in EXPERIMENTS:
         raise InputError(
             "there is no such experiment", value=name, hint=f"There are: {', '.join(sorted(EXPERIMENTS))}."
         )
-    run: Callable[[Path | None], str] = import_module(f"flatpush.experiments.{name.replace('-', '_')}").run
-    return run
+    run: Callable[..., str] = import_module(f"flatpush.experiments.{name.replace('-', '_')}").run
+    if name not in RECORDED:
+        return run
+    folder = data if data is not None else os.environ.get("FLATPUSH_DATA")
+    if not folder or not Path(folder).is_dir():
+        raise InputError(
+            f"the experiment {name!r} reads recorded data",
+            value=None if folder is None else str(folder),
+            hint="Name their folder with --data.",
+        )
+    return partial(run, data=Path(folder))

@@ -3,7 +3,9 @@
 from .ellipsoid import Ellipsoid
 from .exact import Exact
 from .fits import fit_ellipsoid, fit_quartic, fit_surface
+from .loads import LoadsFit, fit_loads
 from .local import local_ellipsoid
+from .pairs import Pairs
 from .quartic import Quartic
 from .report import FitReport
 from .support import CollinearSupportWarning, Support
@@ -15,10 +17,13 @@ __all__ = [
     "Exact",
     "FitReport",
     "LimitSurface",
+    "LoadsFit",
+    "Pairs",
     "Quartic",
     "Support",
     "WrenchSet",
     "fit_ellipsoid",
+    "fit_loads",
     "fit_quartic",
     "fit_surface",
     "local_ellipsoid",

@@ -1,5 +1,6 @@
 """Ellipsoids and convex quartics fitted to pairs of wrench and twist, measured or computed."""
 
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from ..errors import InputError
 from ..geometry.pose import Array
 from .ellipsoid import Ellipsoid
 from .exact import Exact
+from .pairs import checked_pairs, typical_length
 from .quartic import Quartic
 from .report import FitReport, twist_angles
 from .sos import coefficients_of, minors, solve, svec, tensor, tensors
@@ -33,7 +35,8 @@ def fit_ellipsoid(
     """The ellipsoid H = Fᵀ A F that explains pairs of wrench and twist best (program of arXiv 1602.06056).
 
     Minimises λ |A| + β mean |H(F) - 1| + γ mean |A F - s V| over A ≻ 0 and one s > 0 per pair, in
-    normalised coordinates: torques over the length, forces over `force`, unit twists. The result is in SI.
+    normalised coordinates: torques over the length, forces over `force`, unit twists. The result is in SI, and
+    sized so that half of the wrenches lie inside.
 
     Args:
         wrenches: applied wrenches about the centre of friction, shape (n, 3), n ≥ 6 [N, N m].
@@ -67,7 +70,7 @@ def fit_ellipsoid(
     weights = (regularisation, force_weight, velocity_weight)
     x = _program(data, values, gradients, norm, gram, weights)
     scale = np.array([1.0, 1.0, 1 / data.length]) / data.force
-    A = np.tensordot(x[:6], basis, axes=1) * np.outer(scale, scale)
+    A = np.tensordot(x[:6], basis, axes=1) / _middle(values @ x[:6]) * np.outer(scale, scale)
     return Ellipsoid(A, fit=data.report(Ellipsoid(A), regularisation))
 
 
@@ -91,12 +94,12 @@ def fit_quartic(
     T = tensors()
     gradients = 4 * np.einsum("Kijkl,nj,nk,nl->niK", T, F, F, F, optimize=True)
     values = np.einsum("niK,ni->nK", gradients, F) / 4
-    grams = np.concatenate([12 * T.reshape(15, 9, 9), minors()])
-    gram = np.stack([svec(G) for G in grams], axis=1)
+    grams, gram = _grams()
     weights = (regularisation, force_weight, velocity_weight)
     x = _program(data, values, gradients, np.eye(15), gram, weights)
     scale = np.array([1.0, 1.0, 1 / data.length]) / data.force
     mixed = np.outer(scale, scale).ravel()
+    x = x / _middle(values @ x[:15])
     Q = np.tensordot(x[:24], grams, axes=1) * np.outer(mixed, mixed)
     v = coefficients_of(np.einsum("ijkl,i,j,k,l->ijkl", tensor(x[:15]), scale, scale, scale, scale))
     return Quartic(v, gram=Q, fit=data.report(Quartic(v, gram=Q), regularisation))
@@ -149,6 +152,19 @@ def even_twists(length: float, octant: int = _OCTANT) -> Array:
     return (mirrors[:, None] * np.concatenate([V, V[:, [1, 0, 2]]])).reshape(-1, 3)
 
 
+def _middle(values: Array) -> float:
+    """The median of H over the pairs. With the norm's weight H comes out too small; only its size, no direction,
+    and dividing by this puts as many wrenches inside the surface as outside."""
+    return float(np.median(values))
+
+
+@cache
+def _grams() -> tuple[Array, Array]:
+    """The Gram matrices (24, 9, 9) of the 15 monomials and of zero, and the same as columns for the solver."""
+    grams = np.concatenate([12 * tensors().reshape(15, 9, 9), minors()])
+    return grams, np.stack([svec(G) for G in grams], axis=1)
+
+
 class _Pairs:
     """Wrenches and twists, checked and normalised."""
 
@@ -160,43 +176,35 @@ class _Pairs:
         force: float | None,
         needed: int,
     ) -> None:
-        F, V = np.array(wrenches, dtype=float), np.array(twists, dtype=float)
-        if F.ndim != 2 or F.shape[1:] != (3,) or V.shape != F.shape:
-            raise InputError("wrenches and twists have the same shape (n, 3)", value=(F.shape, V.shape))
-        if not (np.isfinite(F).all() and np.isfinite(V).all()):
-            raise InputError("wrenches and twists are finite")
-        if len(F) < needed:
-            raise InputError(f"a fit of this surface needs at least {needed} pairs", value=len(F))
-        if not (np.all(np.any(F != 0, axis=1)) and np.all(np.any(V != 0, axis=1))):
-            raise InputError("no wrench and no twist of a pair is zero", hint="Leave out the pairs at rest.")
+        F, V = checked_pairs(wrenches, twists, needed, "a fit of this surface")
         for name, given in (("length", length), ("force", force)):
             if given is not None and not (np.isfinite(given) and given > 0):
                 raise InputError(f"the {name} is positive and finite", value=given)
         self.raw = F, V
-        self.length = _typical_length(F, V) if length is None else float(length)
+        self.length = typical_length(F, V) if length is None else float(length)
         F, V = F / [1, 1, self.length], V * [1, 1, self.length]
         self.force = float(np.sqrt(np.mean(np.sum(F * F, axis=1)))) if force is None else float(force)
         self.wrenches = F / self.force
         self.twists = V / np.linalg.norm(V, axis=1, keepdims=True)
         scale = np.linalg.norm(F, axis=1, keepdims=True)
         for vectors, what in ((F / scale, "wrenches"), (self.twists, "twists")):
-            if np.linalg.svd(vectors, compute_uv=False)[2] < 1e-6 * np.sqrt(len(F)):
-                raise InputError(f"the {what} of a fit span all three directions", hint="Add other pushes.")
+            singular = np.linalg.svd(vectors, compute_uv=False)
+            if singular[2] < 1e-6 * np.sqrt(len(F)):
+                spanned = int(np.count_nonzero(singular >= 1e-6 * np.sqrt(len(F))))
+                raise InputError(
+                    f"the {what} of a fit span all three directions",
+                    value=spanned,
+                    hint="Add pushes that turn the object, and pushes at other places.",
+                )
+        different = len(np.unique(np.round(np.hstack([F / scale, self.twists]), 9), axis=0))
+        if different < needed:
+            raise InputError(
+                f"a fit of this surface needs at least {needed} different pairs", value=different
+            )
 
     def report(self, surface: LimitSurface, regularisation: float) -> FitReport:
         F, V = self.raw
         return FitReport(twist_angles(surface.twist(F), V, self.length), self.length, regularisation)
-
-
-def _typical_length(F: Array, V: Array) -> float:
-    f, v = np.hypot(F[:, 0], F[:, 1]), np.hypot(V[:, 0], V[:, 1])
-    turning = (np.abs(F[:, 2]) > 0) & (np.abs(V[:, 2]) > 0) & (f > 0) & (v > 0)
-    if np.any(turning):
-        squares = np.abs(F[turning, 2]) * v[turning] / (f[turning] * np.abs(V[turning, 2]))
-        return float(np.sqrt(np.median(squares)))
-    if not np.any(f > 0) or not np.any(F[:, 2]):
-        raise InputError("pairs for a fit have forces as well as torques")
-    return float(np.sqrt(np.mean(F[:, 2] ** 2) / np.mean(f**2)))
 
 
 def _program(
@@ -211,54 +219,33 @@ def _program(
 
     Unknowns: θ (and what else the Gram matrix has), s, ξ, δ of each pair, and the norm.
     """
-    from scipy import sparse
-
     regularisation, force_weight, velocity_weight = weights
     n, count = values.shape
-    width = gram.shape[1]
-    pad = np.zeros((n, width - count))
-    H = sparse.csc_matrix(np.hstack([values, pad]))
-    one, none = sparse.identity(n), sparse.csc_matrix((n, n))
-    spare = sparse.csc_matrix((n, 1))
-    rows: list[Any] = []
-    right: list[Array] = []
-    cones: list[tuple[str, int]] = []
+    width, size = gram.shape[1], int(np.sqrt(2 * len(gram)))
+    s, xi, delta, r = (width + k * n + np.arange(n) for k in range(4))  # their columns; of r only the first
+    each = np.arange(n)
+    rows = _Rows()
     for sign in (1.0, -1.0):  # ξ ≥ ±(H - 1)
-        rows.append(sparse.hstack([sign * H, none, -one, none, spare]))
-        right.append(np.full(n, sign))
-    rows.append(sparse.hstack([sparse.csc_matrix((n, width)), -one, none, none, spare]))
-    right.append(np.full(n, -_LEAST_SCALE))
-    cones.append(("positive", 3 * n))
+        rows.dense(sign * values)
+        rows.entries(each, xi, -1.0)
+        rows.end(np.full(n, sign))
+    rows.entries(each, s, -1.0)
+    rows.end(np.full(n, -_LEAST_SCALE))
     # |D θ - s V| ≤ δ, four rows a pair.
-    D = np.zeros((n, 4, width))
-    D[:, 1:, :count] = -gradients
-    S = np.concatenate([np.zeros((n, 1)), data.twists], axis=1).ravel()
-    first = np.tile([-1.0, 0.0, 0.0, 0.0], n)
-    place = (np.arange(4 * n), np.repeat(np.arange(n), 4))
-    rows.append(
-        sparse.hstack(
-            [
-                sparse.csc_matrix(D.reshape(4 * n, width)),
-                sparse.csc_matrix((S, place), shape=(4 * n, n)),
-                sparse.csc_matrix((4 * n, n)),
-                sparse.csc_matrix((first, place), shape=(4 * n, n)),
-                sparse.csc_matrix((4 * n, 1)),
-            ]
-        )
-    )
-    right.append(np.zeros(4 * n))
-    cones += [("norm", 4)] * n
+    D = np.zeros((n, 4, count))
+    D[:, 1:] = -gradients
+    rows.dense(D.reshape(4 * n, count))
+    rows.entries(4 * each, delta, -1.0)
+    for k in range(3):
+        rows.entries(4 * each + 1 + k, s, data.twists[:, k])
+    rows.end(np.zeros(4 * n))
     # |norm θ| ≤ r.
-    tail = np.zeros((1 + count, width + 3 * n + 1))
-    tail[0, -1] = -1.0
-    tail[1:, :count] = -norm
-    rows.append(sparse.csc_matrix(tail))
-    right.append(np.zeros(1 + count))
-    cones.append(("norm", 1 + count))
-    size = int(np.sqrt(2 * len(gram)))
-    rows.append(sparse.hstack([sparse.csc_matrix(-gram), sparse.csc_matrix((len(gram), 3 * n + 1))]))
-    right.append(-_INSIDE * svec(np.eye(size)))
-    cones.append(("psd", size))
+    rows.entries(np.zeros(1, dtype=int), r[:1], -1.0)
+    rows.dense(np.concatenate([np.zeros((1, count)), -norm]))
+    rows.end(np.zeros(1 + count))
+    rows.dense(-gram)
+    rows.end(-_INSIDE * svec(np.eye(size)))
+    cones = [("positive", 3 * n), *[("norm", 4)] * n, ("norm", 1 + count), ("psd", size)]
     cost = np.concatenate(
         [
             np.zeros(width + n),
@@ -267,4 +254,33 @@ def _program(
             [regularisation],
         ]
     )
-    return solve(cost, sparse.vstack(rows, format="csc"), np.concatenate(right), cones, "the fit")
+    A, b = rows.matrix(width + 3 * n + 1)
+    return solve(cost, A, b, cones, "the fit")
+
+
+class _Rows:
+    """A sparse matrix and its right side, put together block of rows by block of rows."""
+
+    def __init__(self) -> None:
+        self.first = 0
+        self.at: list[tuple[Any, Any, Array]] = []
+        self.right: list[Array] = []
+
+    def dense(self, block: Array) -> None:
+        """Entries of the present block from the first column on."""
+        i, j = np.nonzero(block)
+        self.at.append((self.first + i, j, block[i, j]))
+
+    def entries(self, rows: Any, columns: Any, values: Any) -> None:
+        self.at.append((self.first + rows, columns, np.broadcast_to(values, rows.shape)))
+
+    def end(self, right: Array) -> None:
+        """The block has as many rows as this right side."""
+        self.right.append(right)
+        self.first += len(right)
+
+    def matrix(self, width: int) -> tuple[Any, Array]:
+        from scipy import sparse
+
+        i, j, values = (np.concatenate(part) for part in zip(*self.at, strict=True))
+        return sparse.csc_matrix((values, (i, j)), shape=(self.first, width)), np.concatenate(self.right)
