@@ -83,7 +83,7 @@ def _reach(surfaces: Mapping[str, tuple[LimitSurface, float]], pairs: Pairs, len
         )
         for surface, size in surfaces.values()
     ]
-    return 1.22 * max(float(np.percentile(np.abs(F), 97)), *map(float, sizes))
+    return 1.4 * max(float(np.percentile(np.abs(F), 97)), *map(float, sizes))
 
 
 def _draw_space(axes: Any, surface: LimitSurface, size: float, pairs: Pairs, length: float) -> None:

@@ -1,0 +1,240 @@
+"""flatpush identify: limit surfaces from measured pairs of wrench and twist."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from .common import print_json, telling
+
+MODELS = ("auto", "ellipsoid", "quartic")
+
+
+def command(
+    data: Annotated[
+        list[Path], typer.Argument(help="CSV files of wrenches and twists; columns fx,fy,tau,vx,vy,omega.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the surface here, for a scene's surface: {file: …}."),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw the surface with the data, or the comparison: .svg or .png.")
+    ] = None,
+    model: Annotated[
+        str, typer.Option(help="Written and drawn: auto (the better one), ellipsoid or quartic.")
+    ] = "auto",
+    scene: Annotated[Path | None, typer.Option(help="Also fit the loads on this scene's support.")] = None,
+    pool: Annotated[bool, typer.Option("--pool", help="One surface for all experiments together.")] = False,
+    units: Annotated[
+        str, typer.Option(help="Of columns without a unit in their name: m, cm or mm, and rad or deg.")
+    ] = "m,rad",
+    length: Annotated[
+        float | None, typer.Option(help="Characteristic length [m] of the angles; default: from the data.")
+    ] = None,
+    folds: Annotated[int, typer.Option(help="Parts of the cross-validation.")] = 5,
+    seeds: Annotated[int, typer.Option(help="How many cross-validations, each shuffled anew.")] = 2,
+    skip_bad: Annotated[
+        bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> int:
+    """Fit limit surfaces to DATA and say how well they predict pushes that they have not seen."""
+    from ..documents import check_writable, save_surface
+
+    if model not in MODELS:
+        raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
+    if seeds < 1:
+        raise InputError("--seeds is at least 1", value=seeds)
+    if folds < 2:
+        raise InputError("--folds is at least 2", value=folds)
+    if length is not None and not 0 < length < float("inf"):
+        raise InputError("--length is positive and finite", value=length)
+    for path in (output, figure):
+        if path is not None:
+            check_writable(path)
+    if figure is not None:
+        from ..view.figure import check_ending
+
+        check_ending(figure, (".svg", ".png"))
+    experiments, notes = _read(data, units, skip_bad, pool)
+    if len(experiments) > 1 and output is not None:
+        raise InputError(
+            "a surface is written for one experiment",
+            value=f"{len(experiments)} experiments",
+            hint="--pool fits one surface to all of them.",
+        )
+    for note in notes:
+        typer.echo(note, err=True)
+    places = None if scene is None else _places(scene)
+    found = []
+    for pairs in experiments:
+        with telling(f"fitting {pairs.name}"):
+            found.append(_Found(pairs, places, length, folds, seeds, model))
+    if output is not None:
+        save_surface(found[0].surface, output)
+    if figure is not None:
+        with telling("drawing"):
+            _draw(found, figure)
+    if as_json:
+        print_json({"experiments": [f.document() for f in found], "left_out": notes})
+        return 0
+    _tell(found)
+    for path in (output, figure):
+        if path is not None:
+            typer.echo(f"wrote {path}")
+    return 0
+
+
+class _Found:
+    """The fits of one experiment and how they were judged."""
+
+    def __init__(
+        self, pairs: Any, places: Any, length: float | None, folds: int, seeds: int, model: str
+    ) -> None:
+        from ..friction import fit_ellipsoid, fit_loads, fit_quartic
+        from ..friction.cross_validation import Loads, Smooth, blended, choose, judge
+        from ..friction.pairs import typical_length
+
+        self.pairs = pairs
+        self.length = length or typical_length(pairs.wrenches, pairs.twists)
+        how: dict[str, Any] = {"length": self.length, "folds": folds}
+        self.judged, self.weights, self.fits = {}, {}, {}
+        for name, fit in (("ellipsoid", fit_ellipsoid), ("quartic", fit_quartic)):
+            smooth = Smooth(name)  # type: ignore[arg-type]
+            self.judged[name] = judge(pairs, smooth, seeds=range(seeds), **how)
+            lam, beta = self.weights[name] = choose(pairs, smooth, **how)
+            self.fits[name] = fit(pairs.wrenches, pairs.twists, regularisation=lam, force_weight=beta)
+        self.loads = None
+        if places is not None:
+            loads = Loads(*places)
+            self.judged["loads"] = judge(pairs, loads, seeds=range(seeds), **how)
+            self.judged["mean"] = blended("mean", [self.judged["quartic"], self.judged["loads"]], pairs)
+            trust = self.weights["loads"] = choose(pairs, loads, **how)
+            self.loads = fit_loads(pairs.wrenches, pairs.twists, *places[:2], nominal=places[2], trust=trust)
+        better = min(("ellipsoid", "quartic"), key=lambda name: self.judged[name].mean)
+        self.model = better if model == "auto" else model
+        self.surface = self.fits[self.model]
+
+    def document(self) -> dict[str, Any]:
+        from ..documents.mechanics import surface_form
+        from ..view.angle_table import angle_numbers
+
+        models: dict[str, Any] = {name: angle_numbers([j]) for name, j in self.judged.items()}
+        for name in ("ellipsoid", "quartic"):
+            lam, beta = self.weights[name]
+            models[name] |= {
+                "regularisation": lam,
+                "force_weight": beta,
+                "surface": surface_form(self.fits[name]),
+            }
+        if self.loads is not None:
+            models["loads"] |= {
+                "trust": self.weights["loads"],
+                "shares": self.loads.shares.tolist(),
+                "resistance": self.loads.resistance,
+            }
+        return {
+            "name": self.pairs.name,
+            "pairs": len(self.pairs),
+            "length": self.length,
+            "chosen": self.model,
+            "against": self.pairs.against,
+            "models": models,
+        }
+
+
+def _read(data: list[Path], units: str, skip_bad: bool, pool: bool) -> tuple[list[Any], list[str]]:
+    import numpy as np
+
+    from ..documents import load_pairs
+    from ..friction.pairs import Pairs
+
+    parts = [part.strip() for part in units.split(",")]
+    if len(parts) != 2:
+        raise InputError("--units takes a length and an angle, such as mm,deg", value=units)
+    experiments: list[Any] = []
+    notes: list[str] = []
+    for path in data:
+        file = load_pairs(path, length=parts[0], angle=parts[1], skip_bad=skip_bad)
+        notes += [f"{path}: line {row.line} left out: {row.reason}" for row in file.left_out]
+        if file.unended is not None:
+            notes.append(
+                f"{path}: no line break ends line {file.unended}; if the file was cut there, its last number is wrong"
+            )
+        experiments += file.experiments
+    if pool and len(experiments) > 1:
+        name = f"{len(experiments)} experiments together"
+        wrenches = np.concatenate([e.wrenches for e in experiments])
+        experiments = [Pairs(wrenches, np.concatenate([e.twists for e in experiments]), name)]
+    for pairs in experiments:
+        if pairs.against:
+            notes.append(
+                f"{pairs.name}: {pairs.against} of {len(pairs)} wrenches oppose their twist, which friction does not"
+                " allow; a wrench is what the pusher applies to the object, about the same point as the twist"
+            )
+    return experiments, notes
+
+
+def _places(scene: Path) -> Any:
+    """Places, parts and nominal shares of the support of a scene, about its centre of friction."""
+    import numpy as np
+
+    from ..documents import load_scene
+    from ..friction.loads import radial_parts
+    from ..friction.pressure import Feet
+
+    thing = load_scene(scene).object
+    points, weights = thing.support.feet
+    if isinstance(thing.support.pressure, Feet):
+        return points - thing.cof, np.eye(len(weights)), weights
+    if thing.support_word != "uniform":
+        raise InputError(
+            "loads are fitted on feet, or over the whole face (support: uniform)",
+            source=str(scene),
+            key="object.support",
+        )
+    return radial_parts(thing.outline.translated(-thing.cof))
+
+
+def _tell(found: list[_Found]) -> None:
+    from ..view.angle_table import angle_table
+
+    typer.echo(
+        "Angle between predicted and measured twist of pushes left out; weights chosen inside each training part."
+    )
+    typer.echo(angle_table({f.pairs.name: f.judged for f in found}))
+    if len(found) > 1:
+        wins = sum(f.judged["quartic"].mean < f.judged["ellipsoid"].mean for f in found)
+        typer.echo(f"quartic better than ellipsoid in {wins} of {len(found)}")
+    for f in found:
+        weights = ", ".join(
+            f"{name} λ = {w[0]:g}, β = {w[1]:g}" for name, w in f.weights.items() if name != "loads"
+        )
+        typer.echo(f"{f.pairs.name}: ℓ = {1000 * f.length:.1f} mm, {weights}; chosen: {f.model}")
+        if f.loads is not None:
+            shares = ", ".join(f"{share:.3f}" for share in f.loads.shares)
+            typer.echo(f"  loads {shares} of the whole; friction × load {f.loads.resistance:.2f} N")
+
+
+def _draw(found: list[_Found], path: Path) -> None:
+    if len(found) > 1:
+        from ..view.angle_figure import angle_figure
+
+        angle_figure(
+            {f.pairs.name: f.judged for f in found}, path, title="How far predicted twists are off",
+            subtitle="pushes left out; weights chosen inside each training part",
+        )  # fmt: skip
+        return
+    from ..view.surface_figure import surface_figure
+
+    f = found[0]
+    names = sorted(("ellipsoid", "quartic"), key=lambda name: name != f.model)
+    surfaces: dict[str, Any] = {name: (f.fits[name], 1.0) for name in names}
+    if f.loads is not None:
+        surfaces["loads"] = (f.loads.surface, f.loads.resistance)
+    surface_figure(
+        surfaces, f.pairs, f.length, path, title=f"Limit surfaces of {f.pairs.name}, {len(f.pairs)} pushes",
+        subtitle=f"in space: the {f.model} with all pushes; ℓ = {1000 * f.length:.1f} mm",
+    )  # fmt: skip
