@@ -1,0 +1,298 @@
+"""An object and the fingers that push it, moved step by step."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...contact import ContactMode
+from ...errors import InputError
+from ...friction.surface import LimitSurface
+from ...geometry.pose import Array
+from ...problem import Object
+from ...problem.mechanics import surface_of
+from ...problem.scene import Model
+from .table import outline_table, surface_table
+
+MODES = tuple(
+    mode.value
+    for mode in (
+        ContactMode.REST,
+        ContactMode.STICKING,
+        ContactMode.SLIDING_LEFT,
+        ContactMode.SLIDING_RIGHT,
+        ContactMode.SEPARATION,
+    )
+)
+OUTCOMES = ("", "jammed", "grasped", "starts inside", "too many contacts", "undecided")
+
+
+@dataclass(frozen=True, eq=False)
+class PlantState:
+    """Where object and fingers are.
+
+    Attributes:
+        object: X_WO, shape (3,).
+        hand: X_WE, shape (3,); of fingers that move separately each its own, (k, 3).
+        modes: contact mode of each finger in the last step, ContactMode's words; "separation" where it does not touch.
+        points: nearest points of the outline to the fingers, in O, shape (k, 2): the contacts, where they touch.
+        gaps: between each fingertip and the outline, shape (k,) [m].
+        outcome: "" while all is well; "starts inside", "jammed" (between a finger that moves and one that stands),
+            "grasped" (between fingers that close), after which nothing moves any more.
+    """
+
+    object: Array
+    hand: Array
+    modes: tuple[str, ...]
+    points: Array
+    gaps: Array
+    outcome: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PlantRun:
+    """The object under a given motion of the hand; n poses, k fingers.
+
+    Attributes:
+        object: X_WO at each pose of the hand, shape (n, 3); after the run has ended, where it ended.
+        modes: codes (MODES[code] is the word) in the last step before each pose, shape (n, k).
+        points, gaps: as in PlantState, shapes (n, k, 2) and (n, k).
+        outcome: as in PlantState; "" if the whole motion was made.
+        reached: how many poses of the hand were reached.
+    """
+
+    object: Array
+    modes: Array
+    points: Array
+    gaps: Array
+    outcome: str
+    reached: int
+
+
+@dataclass(frozen=True, eq=False)
+class PlantRuns:
+    """Many runs; n of them, m poses of the hand, k fingers.
+
+    Attributes:
+        final: X_WO at the end, shape (n, 3).
+        outcome: codes, shape (n,); OUTCOMES[code] is the word.
+        stuck: whether no finger slid in a step, shape (n,). It may have been off the object.
+        object, modes: the way, shapes (n, m, 3) and (n, m, k), if it was recorded; else None.
+    """
+
+    final: Array
+    outcome: Any
+    stuck: Any
+    object: Array | None = None
+    modes: Any = None
+
+
+class Plant:
+    """A quasi-static object on the table, and round fingers fixed to one hand or moving separately.
+
+    Args:
+        thing: the object.
+        fingers: fingertip centres in E, shape (k, 2), k ≤ 2 [m].
+        tip_radius: [m].
+        model: limit surface (see problem.mechanics.surface_of; "local": about a push along +x of the hand is not known
+            here, give it as surface).
+        surface: a limit surface about the centre of friction, instead of the model's.
+        friction: between fingertip and object, instead of the object's.
+        cof: the centre of friction in O (2,), instead of the support's centre.
+
+    Raises:
+        InputError: for fingers or numbers that make no sense.
+        FlatpushError: for a surface that the compiled simulation does not know (collinear feet).
+
+    >>> thing = Object([(0, 0), (2, 0), (2, 2), (0, 2)], friction=0.5)
+    >>> plant = Plant(thing, [[0.0, 0.0]], 0.1)
+    >>> state = plant.step(plant.start([0, 0, 0], [-0.1, 1, 0]), [1.0, 0.0, 0.0], 0.5)
+    >>> state.modes, state.object.round(9).tolist()
+    (('sticking',), [0.5, 0.0, 0.0])
+    """
+
+    def __init__(
+        self,
+        thing: Object,
+        fingers: ArrayLike,
+        tip_radius: float,
+        *,
+        model: Model = "exact",
+        surface: LimitSurface | None = None,
+        friction: float | None = None,
+        cof: ArrayLike | None = None,
+    ) -> None:
+        tips = np.ascontiguousarray(np.array(fingers, dtype=float))
+        if tips.ndim != 2 or tips.shape[1] != 2 or not 1 <= len(tips) <= 2 or not np.isfinite(tips).all():
+            raise InputError("fingers are one or two points [x, y] in the pusher's frame", value=fingers)
+        if not (np.isfinite(tip_radius) and tip_radius >= 0):
+            raise InputError("a tip radius is a finite number, 0 or more", value=tip_radius)
+        mu = thing.friction if friction is None else float(friction)
+        if not (np.isfinite(mu) and mu >= 0):
+            raise InputError("friction is a finite number, 0 or more", value=friction)
+        if surface is None and model == "local":
+            raise InputError("the local model depends on the push: give it as surface=", value=model)
+        self.thing, self.friction = thing, mu
+        self.surface = surface if surface is not None else surface_of(thing, model, np.array([1.0, 0.0]))
+        self.fingers, self.tip_radius = tips, float(tip_radius)
+        self.cof = _vector(thing.cof if cof is None else cof, 2, "a centre of friction")
+        kind, table = surface_table(self.surface)
+        #: (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels.
+        self.pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
+
+    def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
+        """The state with the object at X_WO and the hand at X_WE, (3,) or one for each finger (k, 3).
+
+        Where fingers overlap the object it is moved out the shortest way, or, without push_out, the state's outcome is
+        "starts inside".
+        """
+        from .kernels import push_out as out
+
+        q, hands = _vector(object_, 3, "a pose").copy(), self._hands(hand)
+        _, _, cof, shape, _, radius, fingers = self.pack
+        if push_out:
+            out(shape, cof, radius, fingers, q, hands)
+        return self._moved(q, hands, np.zeros_like(hands), np.ndim(hand) == 2)
+
+    def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
+        """The state after a time dt in which the hand moves with a velocity in W (vx, vy, yaw rate), (3,) or (k, 3).
+
+        E's origin goes straight. Fingertips turn with their hand.
+        """
+        if not (np.isfinite(dt) and dt >= 0):
+            raise InputError("a time step is a finite number, 0 or more", value=dt)
+        hands = np.array(state.hand, dtype=float).reshape(-1, 3)
+        step = np.atleast_2d(np.array(velocity, dtype=float)) * dt
+        if step.shape != hands.shape or not np.isfinite(step).all():
+            raise InputError("a velocity is three finite numbers for each hand", value=velocity)
+        if state.outcome:
+            return state
+        return self._moved(state.object.copy(), hands, step, state.hand.ndim == 2)
+
+    def follow(
+        self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True, body: bool = False
+    ) -> PlantRun:
+        """The object, from X_WO, under a hand that goes straight from pose to pose, (n, 3) or (n, k, 3).
+
+        Args:
+            push_out: as in start.
+            body: whether the hand goes from pose to pose with a constant body twist instead.
+        """
+        from .kernels import follow as kernel
+        from .kernels import push_out as out
+
+        q, hands = _vector(object_, 3, "a pose").copy(), self._way(hand)
+        _, _, cof, shape, _, radius, fingers = self.pack
+        if push_out:
+            out(shape, cof, radius, fingers, q, hands[0])
+        n, k = len(hands), len(self.fingers)
+        poses, seen = np.empty((n, 3)), np.zeros((n, k, 5))
+        status, reached = kernel(*self.pack, q, hands, int(body), poses, seen)
+        return PlantRun(
+            poses, seen[:, :, 0].astype(np.int8), seen[:, :, 1:3], seen[:, :, 3], OUTCOMES[status], reached
+        )
+
+    def many(
+        self,
+        starts: ArrayLike,
+        hand: ArrayLike,
+        *,
+        friction: ArrayLike | None = None,
+        surfaces: Sequence[LimitSurface] | None = None,
+        cofs: ArrayLike | None = None,
+        threads: int | None = None,
+        push_out: bool = True,
+        body: bool = False,
+        record: bool = False,
+    ) -> PlantRuns:
+        """Runs from n poses X_WO (n, 3) under one motion of the hand (m, 3), or one for each run (n, m, 3).
+
+        Args:
+            friction: of each run (n,). surfaces: of each, all of one kind and size. cofs: of each (n, 2).
+            threads: default: the machine's cores.
+            push_out, body: as in follow. record: keeps the whole way of every run.
+        """
+        from .kernels import many as kernel
+
+        objects = np.array(starts, dtype=float)
+        if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
+            raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
+        n, k = len(objects), len(self.fingers)
+        kind, table, cof, shape, mu, radius, fingers = self.pack
+        hands = np.array(hand, dtype=float)
+        hands = self._way(hands)[None] if hands.ndim == 2 else np.stack([self._way(h) for h in hands])
+        tables = table[None]
+        if surfaces is not None:
+            packed = [surface_table(s) for s in surfaces]
+            if len({(p[0], p[1].shape) for p in packed}) != 1:
+                raise InputError("the surfaces of many runs are of one kind and size")
+            kind, tables = packed[0][0], np.stack([p[1] for p in packed])
+        mus = np.array([mu]) if friction is None else np.array(friction, dtype=float)
+        centres = cof[None] if cofs is None else np.ascontiguousarray(np.array(cofs, dtype=float))
+        for what, values, width in (
+            ("friction", mus[:, None], 1),
+            ("cofs", centres, 2),
+            ("surfaces", tables[:, 0], None),
+            ("hand", hands[:, 0, 0], 3),
+        ):
+            if (
+                len(values) not in (1, n)
+                or (width and values.shape[1] != width)
+                or not np.isfinite(values).all()
+            ):
+                raise InputError(f"{what}: one for all or one for each of {n} runs", value=values.shape)
+        if np.any(mus < 0):
+            raise InputError("friction is 0 or more", value=float(mus.min()))
+        rows = hands.shape[1] if record else 1
+        poses, seen, outcome = np.empty((n, rows, 3)), np.zeros((n, rows, k, 5)), np.zeros(n, np.int64)
+        workers = threads or os.cpu_count() or 1
+        size = max(1, -(-n // (4 * workers)))
+        args = (kind, tables, centres, shape, mus, radius, fingers, objects, hands, int(body), int(push_out))
+
+        def chunk(first: int) -> None:
+            kernel(first, min(first + size, n), *args, poses, seen, outcome)
+
+        if n:
+            chunk(0)  # compiles, if need be, in one thread
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(chunk, range(size, n, size)))
+        bits = seen[..., 4].astype(int)
+        stuck = ~np.any(bits & 0b1100, axis=(1, 2))
+        way = (poses, seen[..., 0].astype(np.int8)) if record else (None, None)
+        return PlantRuns(poses[:, -1], outcome, stuck, *way)
+
+    def _hands(self, hand: ArrayLike) -> Array:
+        hands = np.atleast_2d(np.array(hand, dtype=float))
+        if hands.shape not in ((1, 3), (len(self.fingers), 3)) or not np.isfinite(hands).all():
+            raise InputError("a hand is one pose, or one for each finger", value=hand)
+        return hands
+
+    def _way(self, hand: ArrayLike) -> Array:
+        way = np.array(hand, dtype=float)
+        way = way[:, None] if way.ndim == 2 else way
+        if way.ndim != 3 or way.shape[2] != 3 or way.shape[1] not in (1, len(self.fingers)) or not len(way):
+            raise InputError("the hand's way is poses, shape (n, 3)", value=np.shape(hand))
+        if not np.isfinite(way).all():
+            raise InputError("the poses of the hand are finite numbers")
+        return np.ascontiguousarray(way)
+
+    def _moved(self, q: Array, hands: Array, step: Array, separate: bool) -> PlantState:
+        from .kernels import advance
+
+        seen = np.zeros((len(self.fingers), 5))
+        status = advance(*self.pack, q, hands, step, 0, seen)
+        modes = tuple(MODES[int(code)] for code in seen[:, 0])
+        return PlantState(
+            q, hands if separate else hands[0], modes, seen[:, 1:3], seen[:, 3], OUTCOMES[status]
+        )
+
+
+def _vector(values: ArrayLike, size: int, what: str) -> Array:
+    vector = np.array(values, dtype=float)
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise InputError(f"{what} is {size} finite numbers", value=values)
+    return vector

@@ -1,0 +1,187 @@
+"""The plant: fingers and an object, step by step, compiled; its parts against their plain versions."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.contact import PointContact
+from flatpush.errors import InputError
+from flatpush.friction import Exact, LimitSurface
+from flatpush.simulation.plant import MODES, Plant
+from flatpush.simulation.plant.table import kernels as table_kernels
+from flatpush.simulation.plant.table import outline_table, surface_table
+from flatpush.simulation.plant.touch import kernels as touch_kernels
+
+TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
+HOOK = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.04), (0.04, 0.04), (0.04, 0.02), (0.0, 0.02)]
+
+
+def surfaces() -> dict[str, LimitSurface]:
+    rng = np.random.default_rng(5)
+    feet = fp.Support.points([(-0.018, -0.012), (0.02, -0.01), (0.0, 0.014)])
+    many = fp.Support.points(rng.normal(size=(60, 2)) * 0.02, rng.uniform(0.2, 1.0, 60))
+    found: dict[str, LimitSurface] = {
+        "three feet": Exact(feet.centred()),
+        "sixty feet": Exact(many.centred()),
+        "polygon": Exact(fp.Support.polygon(TRIANGLE).centred()),
+        "outline": Exact(fp.Support.outline(TRIANGLE).centred()),
+        "disc": Exact(fp.Support.disc(0.03)),
+        "ring": Exact(fp.Support.ring(0.03)),
+        "moved": Exact(fp.Support.polygon(TRIANGLE).centred().translated((0.002, -0.003))),
+        "ellipsoid": fp.Ellipsoid(np.array([[1.0, 0.1, 3.0], [0.1, 1.3, 5.0], [3.0, 5.0, 1800.0]])),
+        "quartic": fp.Quartic([1, 1.2, 3e6, 0.1, 9, 0, 0, 0, 0, 2, 4e3, 4e3, 0, 0, 0]),
+    }
+    return found
+
+
+@pytest.mark.parametrize("name", list(surfaces()))
+def test_tables_resist_as_the_surfaces_they_were_made_of(name):
+    surface = surfaces()[name]
+    kind, table = surface_table(surface)
+    ell = table[0, 0]
+    units = np.array([1.0, 1.0, ell])
+    rng = np.random.default_rng(1)
+
+    def unit(x):
+        return x / np.linalg.norm(x)
+
+    for _ in range(100):
+        x = rng.normal(size=3) * 10 ** rng.uniform(-2, 2, 3)
+        F = np.array(table_kernels.wrench_of(kind, table, *x)[:3])
+        assert unit(F) == pytest.approx(unit(surface.wrench(x / units) / units), abs=1e-10)
+        V = np.array(table_kernels.twist_of(kind, table, *x))
+        assert unit(V) == pytest.approx(unit(surface.twist(x * units) * units), abs=1e-9)
+        p, u = rng.normal(size=2) * 1.5, rng.normal(size=2)
+        V = np.array(table_kernels.stick_of(kind, table, *p, *u))
+        assert pytest.approx(surface.stick(p * ell, u) * units, abs=1e-10) == V
+
+
+@pytest.mark.parametrize("name", list(surfaces()))
+def test_one_contact_moves_as_point_contact_says(name):
+    surface = surfaces()[name]
+    kind, table = surface_table(surface)
+    ell = table[0, 0]
+    rng = np.random.default_rng(2)
+    for i in range(100):
+        p, u, n = rng.normal(size=2) * ell * 1.5, rng.normal(size=2), rng.normal(size=2)
+        n = n / np.hypot(*n)
+        mu = 0.0 if i % 9 == 0 else rng.uniform(0, 1.5)
+        want = PointContact(p, n, mu, hook=True).motion(surface, u)
+        mode, *V, slip = touch_kernels.one(kind, table, *(p / ell), *n, *u, mu)
+        assert MODES[mode] == want.mode.value
+        assert np.array(V) == pytest.approx(
+            want.twist * [1, 1, ell], abs=1e-8 * (1 + np.abs(want.twist[:2]).max())
+        )
+        assert slip == pytest.approx(want.slip, abs=1e-8 * (1 + abs(want.slip)))
+
+
+def test_outlines_are_seen_as_outline_nearest_sees_them():
+    from flatpush.simulation.plant.kernels import nearest
+
+    rng = np.random.default_rng(3)
+    for outline in (
+        fp.Outline.polygon(HOOK),
+        fp.Outline.polygon(TRIANGLE[::-1]),
+        fp.Outline.circle(0.02, (0.01, 0)),
+    ):
+        table = outline_table(outline)
+        for point in rng.uniform(-0.03, 0.08, (300, 2)):
+            want = outline.nearest(point)
+            d, px, py, nx, ny, feature = nearest(table, *point)
+            assert d == pytest.approx(want.distance, abs=1e-15)
+            assert [px, py] == pytest.approx(want.point, abs=1e-15)
+            if feature % 2 == 0:
+                assert [nx, ny] == pytest.approx(want.normal, abs=1e-15)
+            else:  # from the corner on
+                assert np.array([px, py]) - d * np.array([nx, ny]) == pytest.approx(point, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def square():
+    return fp.Object([(-1, -1), (1, -1), (1, 1), (-1, 1)], friction=0.5)
+
+
+def test_a_straight_push_through_the_centre_translates(square):
+    plant = Plant(square, [[0.0, 0.0]], 0.1)
+    state = plant.start([0, 0, 0.3], np.array([-1.3 * np.cos(0.3), -1.3 * np.sin(0.3), 0.3]))
+    assert state.modes == ("separation",)
+    for _ in range(10):
+        state = plant.step(state, [np.cos(0.3), np.sin(0.3), 0.0], 0.1)
+    assert state.modes == ("sticking",)
+    assert state.object == pytest.approx([0.8 * np.cos(0.3), 0.8 * np.sin(0.3), 0.3], abs=1e-9)
+    assert state.gaps[0] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_start_inside_is_an_outcome_or_is_pushed_out(square):
+    plant = Plant(square, [[0.0, 0.3], [0.0, -0.3]], 0.1)
+    inside = plant.start([0, 0, 0], [-1.0, 0.0, 0.0], push_out=False)
+    assert inside.outcome == "starts inside"
+    assert plant.step(inside, [1, 0, 0], 1.0) is inside
+    out = plant.start([0, 0, 0], [-1.0, 0.0, 0.0])
+    assert out.outcome == ""
+    assert out.object == pytest.approx([0.1, 0, 0], abs=1e-9)
+    assert plant.follow([0, 0, 0], [[-1.0, 0, 0], [-0.5, 0, 0]], push_out=False).outcome == "starts inside"
+
+
+def test_a_finger_that_never_touches_leaves_the_object_alone(square):
+    run = Plant(square, [[0.0, 0.0]], 0.1).follow([0, 0, 0], [[-3.0, 0, 0], [-3.0, 5.0, 0], [3.0, 5.0, 0]])
+    assert run.outcome == ""
+    assert np.all(run.object == 0)
+    assert np.all(run.modes == MODES.index("separation"))
+
+
+def test_two_fingers_on_opposite_sides_grasp_and_one_that_stands_still_jams(square):
+    plant = Plant(square, [[0.0, 0.0], [0.0, 0.0]], 0.1)
+    state = plant.start([0, 0, 0], [[-1.1, 0, 0], [1.2, 0, 0]])
+    state = plant.step(state, [[1.0, 0, 0], [-1.0, 0, 0]], 1.0)
+    assert state.outcome == "grasped"
+    assert state.object == pytest.approx([0.05, 0, 0], abs=1e-7)
+    state = plant.start([0, 0, 0], [[-1.1, 0, 0], [1.2, 0, 0]])
+    state = plant.step(state, [[1.0, 0, 0], [0.0, 0, 0]], 1.0)
+    assert state.outcome == "jammed"
+    assert state.object == pytest.approx([0.1, 0, 0], abs=1e-7)
+
+
+def test_many_runs_are_the_single_runs(square):
+    rng = np.random.default_rng(0)
+    starts = rng.normal(size=(12, 3)) * 0.02
+    angle = np.linspace(0, 0.5, 20)
+    hand = np.stack([-1.2 + 2 * np.sin(angle), 2 * (1 - np.cos(angle)), angle], axis=1)
+    mus = rng.uniform(0.2, 0.6, 12)
+    cofs = rng.normal(size=(12, 2)) * 0.1
+    drawn = [fp.Ellipsoid(np.diag([1, 1, rng.uniform(1, 2)])) for _ in range(12)]
+    for fingers in ([[0.0, 0.0]], [[0.0, 0.4], [0.0, -0.4]]):
+        plant = Plant(square, fingers, 0.1)
+        runs = plant.many(starts, hand, friction=mus, surfaces=drawn, cofs=cofs, record=True)
+        for i in range(12):
+            one = Plant(square, fingers, 0.1, surface=drawn[i], friction=mus[i], cof=cofs[i])
+            run = one.follow(starts[i], hand)
+            assert np.array_equal(run.object, runs.object[i])
+            assert np.array_equal(run.modes, runs.modes[i])
+            assert np.array_equal(runs.final[i], run.object[-1])
+
+
+def test_what_makes_no_sense_is_refused(square):
+    for wrong in ([], [[0.0, 0.0, 0.0]], [[0.0, np.nan]], np.zeros((3, 2))):
+        with pytest.raises(InputError, match="fingers are"):
+            Plant(square, wrong, 0.1)
+    for keys in ({"friction": -0.1}, {"model": "local"}, {"cof": [0.0]}):
+        with pytest.raises(InputError):
+            Plant(square, [[0.0, 0.0]], 0.1, **keys)
+    plant = Plant(square, [[0.0, 0.0]], 0.1)
+    state = plant.start([0, 0, 0], [-1.1, 0, 0])
+    for velocity, dt in (([1, 0], 0.1), ([np.nan, 0, 0], 0.1), ([1, 0, 0], -0.1)):
+        with pytest.raises(InputError):
+            plant.step(state, velocity, dt)
+    with pytest.raises(InputError, match="one for each of 2 runs"):
+        plant.many(np.zeros((2, 3)), [[-1.1, 0, 0]], friction=[0.1, 0.2, 0.3])
+
+
+def test_feet_on_one_line_are_not_compiled(square):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        feet = fp.Support.points([(-0.5, 0.0), (0.5, 0.0)])
+    with pytest.raises(fp.FlatpushError, match="does not know"):
+        Plant(square, [[0.0, 0.0]], 0.1, surface=Exact(feet))
