@@ -1,0 +1,164 @@
+"""Clearance of moving bodies: what the kernels say is what shapely measures on dense samples, and nothing is jumped."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flatpush.geometry import Outline, compose, exp, transform
+from flatpush.geometry.collision import Body, World, path_clearance, pose_clearance
+from flatpush.geometry.collision.kernels import twist_gap
+from flatpush.geometry.collision.plain import twist_clearance
+
+ROUNDING = 1e-9  # [m], of lengths of about one
+STEP = 1e-3  # between dense samples [m]; a hundredth of the way of most cases
+
+
+def star(rng: np.random.Generator, corners: int, size: float, centre=(0.0, 0.0)) -> Outline:
+    """A simple polygon, as a rule not convex."""
+    angles = 2 * np.pi * (np.arange(corners) + 0.8 * rng.uniform(-0.5, 0.5, corners)) / corners
+    radii = size * rng.uniform(0.3, 1.0, corners)
+    points = np.array(centre) + radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return Outline.polygon(points if rng.random() < 0.5 else points[::-1])
+
+
+def random_case(seed: int, obstacles: int = 6) -> tuple[World, Body, np.ndarray, np.ndarray]:
+    """A room of about 0.4 m with a body of about 5 cm: world, body, start and a step."""
+    rng = np.random.default_rng(seed)
+    things = []
+    for _ in range(obstacles):
+        at = rng.uniform(-0.2, 0.2, 2)
+        if rng.random() < 0.3:
+            things.append(Outline.circle(rng.uniform(0.003, 0.03), at))
+        else:
+            things.append(star(rng, int(rng.integers(3, 8)), rng.uniform(0.005, 0.05), at))
+    bounds = None if rng.random() < 0.3 else (-0.2, -0.22, 0.21, 0.2)
+    outline = (
+        Outline.circle(0.02, (0.01, 0.0)) if rng.random() < 0.2 else star(rng, int(rng.integers(3, 8)), 0.04)
+    )
+    discs = rng.uniform(-0.05, 0.05, (int(rng.integers(0, 3)), 2))
+    body = Body.of(outline, discs, 0.0025)
+    start = np.array([*rng.uniform(-0.15, 0.15, 2), rng.uniform(-4, 4)])
+    turn = rng.choice([0.0, rng.uniform(-6.2, 6.2), rng.uniform(-0.5, 0.5)])
+    step = np.array([*(rng.uniform(-0.1, 0.1, 2) * (1 + 2 * abs(turn))), turn])
+    return World.of(bounds, things), body, start, step
+
+
+def measured(world: World, body: Body, pose: np.ndarray) -> float:
+    """Clearance of a pose by shapely; negative, of no exact size, where shapes overlap."""
+    shapes = []
+    if body.outline.is_circle:
+        shapes.append((shapely.Point(*transform(pose, body.outline.centre)), body.outline.radius))
+    else:
+        shapes.append((shapely.Polygon(transform(pose, body.outline.vertices)), 0.0))
+    shapes += [(shapely.Point(*tip), body.radius) for tip in transform(pose, body.discs)]
+    best = np.inf
+    for shape, r in shapes:
+        xmin, ymin, xmax, ymax = shape.bounds
+        low, high = world.bounds[:2], world.bounds[2:]
+        best = min(best, np.min(np.array([xmin, ymin]) - low) - r, np.min(high - np.array([xmax, ymax])) - r)
+        for o in world.obstacles:
+            other, more = (
+                (shapely.Point(*o.centre), o.radius) if o.is_circle else (shapely.Polygon(o.vertices), 0.0)
+            )
+            overlap = shape.intersection(other).area > 0 or (
+                shape.distance(other) == 0 and min(r, more) == 0 < max(r, more)
+            )
+            best = min(best, -1.0 if overlap else shape.distance(other) - r - more)
+    return float(best)
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=60, deadline=None)
+def test_a_pose_has_the_clearance_that_shapely_measures(seed: int) -> None:
+    world, body, start, _ = random_case(seed)
+    found, expected = pose_clearance(world, body, start), measured(world, body, start)
+    if expected < -ROUNDING or found < -ROUNDING:
+        assert found < 0
+        assert expected < 0
+    else:
+        assert found == pytest.approx(expected, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("obstacles", [3, 40])
+@given(seed=st.integers(0, 10**9))
+@settings(max_examples=12, deadline=None)
+def test_a_path_has_the_least_clearance_of_dense_samples(obstacles: int, seed: int) -> None:
+    """The exact least clearance is at most that of any sample and at most half a step's way below the least of them."""
+    world, body, start, step = random_case(seed, obstacles)
+    far = body.arrays[1][3] + np.hypot(*body.arrays[1][1:3])
+    way = np.hypot(*step[:2]) + abs(step[2]) * far
+    n = int(np.ceil(way / STEP)) + 1
+    samples = [compose(start, exp(t * step)) for t in np.linspace(0, 1, n + 1)]
+    least = min(measured(world, body, X) for X in samples)
+    found = path_clearance(world, body, start, [step])
+    if least < 0:
+        assert found.distance <= ROUNDING
+    elif found.distance > 0:
+        assert least - way / n - ROUNDING <= found.distance <= least + ROUNDING
+        at = measured(world, body, compose(start, exp(found.fraction * step)))
+        assert at == pytest.approx(found.distance, abs=1e-7)
+    else:  # it touches between samples: then the samples come near
+        assert least <= way / n + ROUNDING
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=25, deadline=None)
+def test_the_compiled_clearance_is_the_plain_one(seed: int) -> None:
+    world, body, start, step = random_case(seed, 5 if seed % 2 else 30)
+    points, ball = body.arrays
+    if pose_clearance(world, body, start) < 0:
+        return
+    found = twist_gap(world.arrays, points, ball, start, step, 1e3, -np.inf)
+    expected, _, _ = twist_clearance(world, body, start, step)
+    # Where shapes overlap on the way both are zero or less; how much less depends on which pairs are looked at.
+    if max(found, expected) > ROUNDING:
+        assert found == pytest.approx(expected, abs=ROUNDING)
+
+
+def test_what_lies_inside_another_overlaps() -> None:
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
+    big, small = Outline.polygon(10 * square), Outline.polygon(square)
+    disc, dot = Outline.circle(10.0), Outline.circle(1.0)
+    for outer in (big, disc):
+        for inner in (small, dot):
+            for obstacle, thing in ((outer, inner), (inner, outer)):
+                world = World.of(None, [obstacle])
+                assert pose_clearance(world, Body.of(thing), (0.3, -0.2, 0.4)) < 0
+    # A finger inside an obstacle that the object is clear of; overlapping obstacles do not cancel each other.
+    world = World.of(None, [big, Outline.polygon(10 * square + 3.0)])
+    assert pose_clearance(world, Body.of(small, [(-19.0, 0.0)], 0.5), (20.0, 1.0, 0.0)) < 0
+    assert pose_clearance(world, Body.of(small), (2.0, 2.0, 0.0)) < 0
+
+
+def test_a_cross_without_a_corner_inside_the_other_overlaps() -> None:
+    bar = np.array([(-2, -0.1), (2, -0.1), (2, 0.1), (-2, 0.1)], dtype=float)
+    world, body = World.of(None, [Outline.polygon(bar)]), Body.of(Outline.polygon(bar))
+    assert pose_clearance(world, body, (0.0, 0.0, np.pi / 2)) < 0
+    assert pose_clearance(world, body, (0.0, 3.0, 0.0)) == pytest.approx(2.8)
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 1e-6])
+def test_nothing_is_jumped_however_thin(thickness: float) -> None:
+    """A wall thinner than any step: the straight way through it and the turn through it are both found out."""
+    wall = [(-thickness, -5), (thickness, -5), (thickness, 5), (-thickness, 5)]
+    world, body = World.of(None, [Outline.polygon(wall)]), Body.of(Outline.circle(0.1))
+    assert path_clearance(world, body, (-1, 0, 0), [(2, 0, 0)]).distance <= 0
+    assert path_clearance(world, body, (-1, 0, 0.5), [(0, -3.0, np.pi)]).distance <= 0
+    free = path_clearance(world, body, (-1, 0, 0), [(0, 2, 0)])
+    assert free.distance == pytest.approx(0.9 - thickness)
+    assert free.obstacle == 0
+
+
+def test_touching_is_clearance_zero_and_the_place_is_named() -> None:
+    world = World.of((0, 0, 10, 10), [Outline.polygon([(4, 0), (6, 0), (6, 3), (4, 3)])])
+    body = Body.of(Outline.polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
+    over = path_clearance(world, body, (1, 5, 0), [(8, 0, 0), (0, 0, 0)])
+    assert over.distance == 0.0
+    assert over.obstacle == -1  # the side on which it starts
+    nearer = path_clearance(world, body, (2, 7, 0), [(3, -2.5, 0), (3, 2.5, 0)])
+    assert nearer.distance == pytest.approx(0.5)
+    assert (nearer.piece, nearer.obstacle) == (0, 0)
+    assert nearer.fraction == pytest.approx(1.0)
+    assert path_clearance(World.of(), body, (0, 0, 0), [(1, 0, 0)]).obstacle == -2
