@@ -112,7 +112,10 @@ def test_degenerate_pairs_make_no_spurious_turn():
 
 
 def test_special_goals_at_every_scale():
-    """Unit radius, offsets from 1e-9 to 1e6; OMPL is no judge of pairs nearer than 1e-5 but not equal."""
+    """Unit radius, offsets from 1e-9 to 1e6; OMPL is no judge of pairs not farther apart than 1e-5 but not equal.
+
+    The power of ten may round to either side of 1e-5, differently on different processors.
+    """
     ompl = Ompl()
     headings = [0.0, np.pi, -np.pi, np.pi / 2, 2 * np.pi, 2 * np.pi - 1e-12, 2 * np.pi - 1e-3, 1e-3]
     for scale in 10.0 ** np.arange(-9, 7):
@@ -121,5 +124,5 @@ def test_special_goals_at_every_scale():
                 for h1 in headings:
                     start = np.array([0.0, 0.0, h0])
                     goal = np.array([x * scale, y * scale, h1])
-                    near = np.hypot(x, y) * scale < 1e-5 and abs(np.angle(np.exp(1j * (h1 - h0)))) < 1e-5
+                    near = np.hypot(x, y) * scale < 1.1e-5 and abs(np.angle(np.exp(1j * (h1 - h0)))) < 1e-5
                     check(start, goal, 1.0, None if near else ompl)

@@ -61,7 +61,11 @@ def several_motion(
     for V, pushing, sticking in _answers(contacts, surface, u, speed):
         if all(_opening(c, V, v) >= -CLOSED * speed for c, v in zip(contacts, u, strict=True)):
             modes = [
-                ContactMode.STICKING if i in sticking else _side(c, V, v) if i in pushing else ContactMode.SEPARATION
+                ContactMode.STICKING
+                if i in sticking
+                else _side(c, V, v)
+                if i in pushing
+                else ContactMode.SEPARATION
                 for i, (c, v) in enumerate(zip(contacts, u, strict=True))
             ]
             return SeveralMotion(tuple(modes), V)
@@ -168,7 +172,9 @@ def _made(rays: Array, wrenches: WrenchSet, lever: float) -> bool:
     shares, _ = nnls((G / size[:, None] * stiff).T, F * stiff, maxiter=200)
     missing = shares @ (G / size[:, None]) - F
     free = wrenches.radius + CLOSED * float(np.linalg.norm(F))
-    return bool(np.hypot(*missing[:2]) <= free and abs(missing[2]) <= 1e-7 * float(np.linalg.norm(F)) + CLOSED)
+    return bool(
+        np.hypot(*missing[:2]) <= free and abs(missing[2]) <= 1e-7 * float(np.linalg.norm(F)) + CLOSED
+    )
 
 
 def _rows_of(contact: PointContact, u: Array, sticking: bool) -> Array:
@@ -215,5 +221,7 @@ def _sliding(
                 continue
             V = scale * V
             slips = [_slip(c, V, v) for c, v in zip(contacts, u, strict=True)]
-            if all((s > 0) == side or c.friction == 0 for c, s, side in zip(contacts, slips, left, strict=True)):
+            if all(
+                (s > 0) == side or c.friction == 0 for c, s, side in zip(contacts, slips, left, strict=True)
+            ):
                 yield V

@@ -97,8 +97,8 @@ class SteeringEstimate:
         return Axle(
             heading,
             offset,
-            float(np.sqrt(max(0.0, across @ cov[:2, :2] @ across))) / r,
-            float(np.sqrt(max(0.0, slope @ cov @ slope))),
+            float(np.sqrt(max(0.0, float(across @ cov[:2, :2] @ across)))) / r,
+            float(np.sqrt(max(0.0, float(slope @ cov @ slope)))),
         )
 
     def turn(self, point: ArrayLike, velocity: ArrayLike) -> float:

@@ -191,6 +191,10 @@ def _read_yaml(text: str, source: str) -> Any:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "unreadable characters"
+        if (
+            "nesting depth" in problem
+        ):  # newer parsers look so far ahead that they stop before the level is counted
+            raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source) from None
         raise InputError(f"this is not YAML: {place}{problem}", source=source, hint=_CUT_OFF) from None
     return root[0] if root else None
 

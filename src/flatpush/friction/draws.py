@@ -104,12 +104,15 @@ class SurfaceDraws:
 
     @cached_property
     def _face(self) -> tuple[Array, Array]:
-        """L (9, r) and an orthonormal basis (k, r, r) of 𝓛: symmetric B for which L B Lᵀ is of a quartic's Hessian."""
+        """L (9, 9) and an orthonormal basis (k, 9, 9) of 𝓛: symmetric B for which L B Lᵀ is of a quartic's Hessian.
+
+        L is the symmetric root of Q, which no choice of eigenvectors changes.
+        """
         assert isinstance(self.surface, Quartic)
         values, vectors = np.linalg.eigh(self.surface.gram * self._mixed)
         kept = values > _RANGE * values[-1]
-        L = vectors[:, kept] * np.sqrt(values[kept])
-        back = (vectors[:, kept] / np.sqrt(values[kept])).T
+        L = (vectors[:, kept] * np.sqrt(values[kept])) @ vectors[:, kept].T
+        back = (vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T
         grams = np.concatenate([12 * tensors().reshape(15, 9, 9), minors()])
         if not kept.all():  # only those that vanish where Q does
             outside = np.einsum("kij,jn->kin", grams, vectors[:, ~kept]).reshape(24, -1)

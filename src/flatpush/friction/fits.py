@@ -35,8 +35,7 @@ def fit_ellipsoid(
     """The ellipsoid H = Fᵀ A F that explains pairs of wrench and twist best (program of arXiv 1602.06056).
 
     Minimises λ |A| + β mean |H(F) - 1| + γ mean |A F - s V| over A ≻ 0 and one s > 0 per pair, in
-    normalised coordinates: torques over the length, forces over `force`, unit twists. The result is in SI, and
-    sized so that half of the wrenches lie inside.
+    normalised coordinates: torques over the length, forces over `force`, unit twists. The result is in SI.
 
     Args:
         wrenches: applied wrenches about the centre of friction, shape (n, 3), n ≥ 6 [N, N m].
@@ -70,7 +69,7 @@ def fit_ellipsoid(
     weights = (regularisation, force_weight, velocity_weight)
     x = _program(data, values, gradients, norm, gram, weights)
     scale = np.array([1.0, 1.0, 1 / data.length]) / data.force
-    A = np.tensordot(x[:6], basis, axes=1) / _middle(values @ x[:6]) * np.outer(scale, scale)
+    A = np.tensordot(x[:6], basis, axes=1) * np.outer(scale, scale)
     return Ellipsoid(A, fit=data.report(Ellipsoid(A), regularisation))
 
 
@@ -99,7 +98,6 @@ def fit_quartic(
     x = _program(data, values, gradients, np.eye(15), gram, weights)
     scale = np.array([1.0, 1.0, 1 / data.length]) / data.force
     mixed = np.outer(scale, scale).ravel()
-    x = x / _middle(values @ x[:15])
     Q = np.tensordot(x[:24], grams, axes=1) * np.outer(mixed, mixed)
     v = coefficients_of(np.einsum("ijkl,i,j,k,l->ijkl", tensor(x[:15]), scale, scale, scale, scale))
     return Quartic(v, gram=Q, fit=data.report(Quartic(v, gram=Q), regularisation))
@@ -150,12 +148,6 @@ def even_twists(length: float, octant: int = _OCTANT) -> Array:
     V = np.stack([across * np.cos(angle), across * np.sin(angle), z / length], axis=1)
     mirrors = np.array([[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1]])
     return (mirrors[:, None] * np.concatenate([V, V[:, [1, 0, 2]]])).reshape(-1, 3)
-
-
-def _middle(values: Array) -> float:
-    """The median of H over the pairs. With the norm's weight H comes out too small; only its size, no direction,
-    and dividing by this puts as many wrenches inside the surface as outside."""
-    return float(np.median(values))
 
 
 @cache

@@ -160,9 +160,10 @@ def _feature_gap(
             best = min(
                 best, math.sqrt(point_segment(ax, ay, P[k, 0], P[k, 1], P[n, 0], P[n, 1], P[k, 3])) - r
             )
-            if (P[k, 1] > ay) != (P[n, 1] > ay):
-                if ax < P[k, 0] + (ay - P[k, 1]) * (P[n, 0] - P[k, 0]) / (P[n, 1] - P[k, 1]):
-                    inside = not inside
+            if (P[k, 1] > ay) != (P[n, 1] > ay) and (
+                ax < P[k, 0] + (ay - P[k, 1]) * (P[n, 0] - P[k, 0]) / (P[n, 1] - P[k, 1])
+            ):
+                inside = not inside
         for k in range(corners, len(P)):
             best = min(best, math.hypot(ax - P[k, 0], ay - P[k, 1]) - r - P[k, 2])
         return INSIDE if inside else best
@@ -193,7 +194,7 @@ def _feature_gap(
 
 @outer
 def pose_gap(W: Any, P: Array, ball: Any, pose: Array, reach: float, need: float) -> float:
-    """Clearance of the body at a pose X_WO, at most `reach`; negative where it overlaps something or leaves the bounds."""
+    """Clearance of the body at a pose X_WO, at most `reach`; negative where it overlaps or leaves the bounds."""
     x, y, c, s = pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2])
     corners, bounds = ball[0], W[2]
     best = reach

@@ -111,7 +111,7 @@ class Plant:
     >>> thing = Object([(0, 0), (2, 0), (2, 2), (0, 2)], friction=0.5)
     >>> plant = Plant(thing, [[0.0, 0.0]], 0.1)
     >>> state = plant.step(plant.start([0, 0, 0], [-0.1, 1, 0]), [1.0, 0.0, 0.0], 0.5)
-    >>> state.modes, state.object.round(9).tolist()
+    >>> state.modes, (state.object.round(9) + 0.0).tolist()
     (('sticking',), [0.5, 0.0, 0.0])
     """
 
