@@ -30,6 +30,7 @@ _NAMES = {
     "LimitSurface": "friction",
     "MissingExtra": "errors",
     "NoDubinsReduction": "errors",
+    "Noise": "simulation",
     "Object": "problem",
     "Outline": "geometry",
     "Perturbation": "simulation",
@@ -42,6 +43,7 @@ _NAMES = {
     "Quartic": "friction",
     "Report": "simulation",
     "Rollout": "problem",
+    "Runs": "simulation",
     "Scene": "problem",
     "Support": "friction",
     "Workspace": "problem",
@@ -53,6 +55,7 @@ _NAMES = {
     "load_scene": "documents",
     "plan": "planning",
     "simulate": "simulation",
+    "study": "simulation",
     "two_point_sticks": "contact",
     "verify": "simulation",
 }
@@ -71,6 +74,7 @@ __all__ = [
     "LimitSurface",
     "MissingExtra",
     "NoDubinsReduction",
+    "Noise",
     "Object",
     "Outline",
     "Perturbation",
@@ -83,6 +87,7 @@ __all__ = [
     "Quartic",
     "Report",
     "Rollout",
+    "Runs",
     "Scene",
     "Support",
     "Workspace",
@@ -96,6 +101,7 @@ __all__ = [
     "load_scene",
     "plan",
     "simulate",
+    "study",
     "two_point_sticks",
     "verify",
 ]
@@ -128,7 +134,7 @@ if TYPE_CHECKING:
         Scene,
         Workspace,
     )
-    from .simulation import Claim, Perturbation, Report, simulate, verify
+    from .simulation import Claim, Noise, Perturbation, Report, Runs, simulate, study, verify
     from .steering import dubins, flat_output
 
 

@@ -1,80 +1,195 @@
 """flatpush simulate: rolls a plan out, perturbed if asked."""
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from .common import error_text, pose_text, print_json, telling
+from .common import error_text, numbers, pose_text, print_json, telling
 
 
 def command(
     plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
-    runs: Annotated[int, typer.Option(help="How many; more than one perturbs start and friction.")] = 1,
-    seed: Annotated[int, typer.Option(help="Of the perturbations.")] = 0,
+    runs: Annotated[int, typer.Option(help="How many; more than one disturbs start and friction.")] = 1,
+    seed: Annotated[int, typer.Option(help="Of the disturbances.")] = 0,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write every run here (JSON).")
+        Path | None, typer.Option("-o", "--output", help="Write every run here (JSON; many runs also .csv).")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Draw plan and runs: .svg, .png, .gif or .html.")
+        Path | None,
+        typer.Option(help="Draw it: one run .svg, .png, .gif or .html; the tube of many .svg or .png."),
     ] = None,
     model: Annotated[str, typer.Option(help="Limit surface: exact, ellipsoid, local or quartic.")] = "exact",
     source: Annotated[str, typer.Option(help="The pusher follows the plan's arcs or its samples.")] = "arcs",
+    position: Annotated[float, typer.Option(help="Noise of the start, each axis [mm].")] = 0.5,
+    angle: Annotated[float, typer.Option(help="Noise of the start [deg].")] = 0.5,
+    friction: Annotated[float, typer.Option(help="Noise of the friction at the fingers [%].")] = 10.0,
+    friction_range: Annotated[
+        str | None, typer.Option(help="Friction at the fingers uniform in LOW,HIGH instead.")
+    ] = None,
+    df: Annotated[
+        float | None,
+        typer.Option(
+            help="Wishart draws of the limit surface; default 50 for ellipsoid and quartic, 0 for none."
+        ),
+    ] = None,
+    centre: Annotated[float, typer.Option(help="Noise of the centre of friction, each axis [mm].")] = 0.0,
+    loads: Annotated[float, typer.Option(help="Loads of the feet within ± this [%].")] = 0.0,
+    on_cluster: Annotated[
+        bool, typer.Option("--cluster", help="Spread the runs over a local Dask cluster.")
+    ] = False,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Spread them over the Dask cluster at this address.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Roll PLAN out in the quasi-static contact simulator."""
-    from ..documents import check_writable, load_plan, save_rollouts
+    from ..documents import check_writable, load_plan
     from ..problem.scene import MODELS
-    from ..simulation import Perturbation, simulate
 
     if runs < 1:
         raise InputError("--runs is at least 1", value=runs)
+    if seed < 0:
+        raise InputError("--seed is 0 or more", value=seed)
     if model not in MODELS:
         raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
     if source not in ("arcs", "samples"):
         raise InputError("--source is arcs or samples", value=source)
+    noise = _noise(position, angle, friction, friction_range, df, centre, loads, model)
     loaded = load_plan(plan)
     for path in (output, figure):
         if path is not None:
             check_writable(path)
     if figure is not None:
-        from ..view import check_figure
+        from ..view.figure import ENDINGS, check_ending
 
-        check_figure(figure)
-    rollouts = []
-    with telling(f"simulating {runs} run{'s' if runs > 1 else ''}"):
-        for k in range(runs):
-            noise = Perturbation() if runs > 1 else None
-            rollouts.append(simulate(loaded, seed + k, model=model, source=source, perturbation=noise))  # type: ignore[arg-type]
+        check_ending(figure, ENDINGS if runs == 1 else (".svg", ".png"))
+    if runs == 1:
+        return _one(loaded, model, source, output, figure, as_json)
+    return _many(loaded, runs, seed, noise, model, source, output, figure, on_cluster, scheduler, as_json)
+
+
+def _noise(
+    position: float,
+    angle: float,
+    friction: float,
+    friction_range: str | None,
+    df: float | None,
+    centre: float,
+    loads: float,
+    model: str,
+) -> Any:
+    from ..simulation import Noise
+
+    given = {
+        "--position": position,
+        "--angle": angle,
+        "--friction": friction,
+        "--centre": centre,
+        "--loads": loads,
+    }
+    for option, value in given.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise InputError("noise is a finite number, 0 or more", key=option, value=value)
+    if loads >= 100:
+        raise InputError("the loads of feet vary by less than 100 %", key="--loads", value=loads)
+    between = numbers(friction_range, 2, "--friction-range")
+    if between is not None and not 0 <= between[0] <= between[1]:
+        raise InputError("it takes two numbers, 0 ≤ LOW ≤ HIGH", key="--friction-range", value=friction_range)
+    if df is None:
+        df = 50.0 if model in ("ellipsoid", "quartic") else 0.0
+    least = 9 if model == "quartic" else 3
+    if df != 0 and not (math.isfinite(df) and df >= least):
+        raise InputError(f"it is at least {least} here, or 0 for none", key="--df", value=df)
+    return Noise(
+        position=position / 1000,
+        angle=math.radians(angle),
+        friction=friction / 100,
+        friction_range=None if between is None else (between[0], between[1]),
+        df=df or None,
+        centre=centre / 1000,
+        loads=loads / 100,
+    )
+
+
+def _one(plan: Any, model: Any, source: Any, output: Path | None, figure: Path | None, as_json: bool) -> int:
+    from ..documents import save_rollouts
+    from ..simulation import simulate
+
+    with telling("simulating 1 run"):
+        rollout = simulate(plan, model=model, source=source)
     if output is not None:
-        save_rollouts(rollouts, output)
+        save_rollouts([rollout], output)
     if figure is not None:
         from ..view import save_figure
 
         with telling("drawing"):
-            save_figure(loaded, figure, rollouts=tuple(rollouts))
-    results = [_result(loaded, rollout) for rollout in rollouts]
+            save_figure(plan, figure, rollouts=(rollout,))
+    r = _result(plan, rollout)
     if as_json:
-        print_json({"runs": results, "summary": _summary(results)})
+        print_json({"runs": [r], "summary": {"outcomes": {r["outcome"]: 1}}})
         return 0
-    if runs == 1:
-        r = results[0]
-        typer.echo(f"{r['outcome']}: the object ends at {pose_text(r['final_pose'])}")
-        typer.echo(f"off the goal by {error_text(r['distance'], r['turn'])}")
-        typer.echo("modes: " + ", ".join(f"{name} {count}" for name, count in r["modes"].items()))
-    else:
-        s = _summary(results)
-        typer.echo(f"{runs} runs: " + ", ".join(f"{count} {name}" for name, count in s["outcomes"].items()))
-        typer.echo(
-            f"off the goal: median {error_text(s['median_distance'], s['median_turn'])},"
-            f" worst {error_text(s['worst_distance'], s['worst_turn'])}"
+    typer.echo(f"{r['outcome']}: the object ends at {pose_text(r['final_pose'])}")
+    typer.echo(f"off the goal by {error_text(r['distance'], r['turn'])}")
+    typer.echo("modes: " + ", ".join(f"{name} {count}" for name, count in r["modes"].items()))
+    _wrote(output, figure)
+    return 0
+
+
+def _many(
+    plan: Any,
+    runs: int,
+    seed: int,
+    noise: Any,
+    model: Any,
+    source: Any,
+    output: Path | None,
+    figure: Path | None,
+    on_cluster: bool,
+    scheduler: str | None,
+    as_json: bool,
+) -> int:
+    from ..documents import save_runs
+    from ..simulation import study
+
+    where: Any = nullcontext(map)
+    if on_cluster or scheduler is not None:
+        from .cluster import cluster
+
+        where = cluster(scheduler)
+    with telling(f"simulating {runs} runs"), where as spread:
+        found = study(
+            plan,
+            runs,
+            seed,
+            noise=noise,
+            model=model,
+            source=source,
+            record=figure is not None,
+            spread=spread,
         )
-    for path in (output, figure):
+    if output is not None:
+        save_runs(found, output)
+    if figure is not None:
+        from ..view.tube import tube_figure
+
+        with telling("drawing"):
+            tube_figure(found, figure)
+    if as_json:
+        print_json(_document(found))
+        return 0
+    _tell(found)
+    _wrote(output, figure)
+    return 0
+
+
+def _wrote(*paths: Path | None) -> None:
+    for path in paths:
         if path is not None:
             typer.echo(f"wrote {path}")
-    return 0
 
 
 def _result(plan: Any, rollout: Any) -> dict[str, Any]:
@@ -91,12 +206,75 @@ def _result(plan: Any, rollout: Any) -> dict[str, Any]:
     }
 
 
-def _summary(results: list[dict[str, Any]]) -> dict[str, Any]:
-    from statistics import median
+def _document(found: Any) -> dict[str, Any]:
+    from ..simulation.study import QUANTILES
 
-    outcomes = [r["outcome"] for r in results]
+    errors = found.errors
+    quantiles = {name: values.tolist() for name, values in found.quantiles().items()}
     return {
-        "outcomes": {name: outcomes.count(name) for name in dict.fromkeys(outcomes)},
-        **{f"median_{key}": median(r[key] for r in results) for key in ("distance", "turn")},
-        **{f"worst_{key}": max(r[key] for r in results) for key in ("distance", "turn")},
+        "runs": [
+            {
+                "final_pose": found.final[k].tolist(),
+                "outcome": found.outcomes[k],
+                "sticking": bool(found.sticking[k]),
+                "distance": float(errors[k, 0]),
+                "turn": float(errors[k, 1]),
+            }
+            for k in range(len(found))
+        ],
+        "summary": {
+            "seed": found.seed,
+            "outcomes": _outcomes(found),
+            "sticking_share": found.sticking_share,
+            "mean": found.mean.tolist(),
+            "covariance": found.covariance.tolist(),
+            "quantiles": {"shares": list(QUANTILES), **quantiles},
+            **{f"median_{name}": quantiles[name][2] for name in ("distance", "turn")},
+            **{f"worst_{name}": float(errors[:, k].max()) for k, name in enumerate(("distance", "turn"))},
+        },
     }
+
+
+def _outcomes(found: Any) -> dict[str, int]:
+    return {name: found.outcomes.count(name) for name in dict.fromkeys(found.outcomes)}
+
+
+def _tell(found: Any) -> None:
+    import numpy as np
+
+    errors, deviations = found.errors, np.sqrt(np.diag(found.covariance))
+    typer.echo(
+        f"{len(found)} runs: " + ", ".join(f"{count} {name}" for name, count in _outcomes(found).items())
+    )
+    typer.echo(
+        f"off the goal: median {error_text(*np.median(errors, axis=0))}, worst {error_text(*np.max(errors, axis=0))}"
+    )
+    typer.echo(f"stayed sticking: {100 * found.sticking_share:.1f} %")
+    typer.echo(f"mean final pose {pose_text(found.mean)}")
+    typer.echo(
+        f"standard deviations {1000 * deviations[0]:.3f} mm, {1000 * deviations[1]:.3f} mm,"
+        f" {math.degrees(deviations[2]):.3f}°; correlations"
+        + "".join(f" {a}{b} {value:+.2f}" for a, b, value in _correlations(found.covariance, deviations))
+    )
+    scale = {"x": 1000.0, "y": 1000.0, "distance": 1000.0, "angle": 180 / math.pi, "turn": 180 / math.pi}
+    typer.echo(
+        f"{'quantiles':<24}" + "".join(f"{share:>10}" for share in ("5 %", "25 %", "50 %", "75 %", "95 %"))
+    )
+    words = {
+        "x": "x [mm]",
+        "y": "y [mm]",
+        "angle": "angle [°]",
+        "distance": "distance to goal [mm]",
+        "turn": "turn to goal [°]",
+    }
+    for name, values in found.quantiles().items():
+        typer.echo(f"{words[name]:<24}" + "".join(f"{scale[name] * value:>10.3f}" for value in values))
+
+
+def _correlations(covariance: Any, deviations: Any) -> list[tuple[str, str, float]]:
+    names = "xyθ"
+    found = []
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        size = float(deviations[i] * deviations[j])
+        found.append((names[i], names[j], float(covariance[i, j]) / size if size > 0 else 0.0))
+    return found

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import read_mapping
     from .rollout_file import save_rollouts
+    from .runs_file import save_runs
     from .scene_reader import load_scene, parse_scene
     from .scene_writer import scene_document
     from .schema import plan_schema, scene_schema
@@ -35,6 +36,7 @@ __all__ = [
     "read_mapping",
     "save_plan",
     "save_rollouts",
+    "save_runs",
     "save_surface",
     "scene_document",
     "scene_schema",
@@ -58,6 +60,7 @@ _HOME = {
     "read_mapping": "reading",
     "save_plan": "plan_file",
     "save_rollouts": "rollout_file",
+    "save_runs": "runs_file",
     "save_surface": "surface_file",
     "scene_document": "scene_writer",
     "scene_schema": "schema",

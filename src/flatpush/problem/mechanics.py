@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact import Placement, PointContact, place_fingers
 from ..errors import FlatpushError
-from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, fit_surface, local_ellipsoid
+from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import OutlinePoint
 from ..geometry.pose import Array
 from .scene import Model, Object, Push, Scene
@@ -48,7 +48,7 @@ def contact_at(scene: Scene, at: OutlinePoint) -> PointContact:
 
 def true_surface(thing: Object) -> LimitSurface:
     """The limit surface that is believed: the known one, else the support's own."""
-    return thing.surface if thing.surface is not None else _exact(thing)
+    return thing.surface if thing.surface is not None else _exact(thing.support)
 
 
 def surface_of(thing: Object, model: Model, direction: Array) -> LimitSurface:
@@ -84,8 +84,8 @@ def divergence_length(thing: Object, contact: PointContact) -> float:
 
 
 @lru_cache(maxsize=64)
-def _exact(thing: Object) -> LimitSurface:
-    return Exact(thing.support.centred())
+def _exact(support: Support) -> LimitSurface:
+    return Exact(support.centred())
 
 
 @lru_cache(maxsize=64)

@@ -135,7 +135,8 @@ class Rollout:
         times: [s], shape (n,).
         object, pusher: poses X_WO and X_WE, shape (n, 3).
         modes: contact mode of each sample ("sticking", "sliding_left", …; "rest" in a transit).
-        outcome: "completed", "lost contact", "left the cone" or "passed a corner".
+        outcome: "completed", "passed a corner", "lost contact" (no finger touches at the end of a push), or why the
+            simulation stopped: "jammed", "grasped".
         seed: of the perturbation; None for the nominal run.
     """
 

@@ -4,7 +4,20 @@ Nothing here imports steering or planning: a mistake there shows as a failed cla
 """
 
 from .claims import certify, clearance_of
+from .noise import Noise
 from .rollout import Perturbation, simulate
+from .study import Runs, study
 from .verify import Claim, Report, verify
 
-__all__ = ["Claim", "Perturbation", "Report", "certify", "clearance_of", "simulate", "verify"]
+__all__ = [
+    "Claim",
+    "Noise",
+    "Perturbation",
+    "Report",
+    "Runs",
+    "certify",
+    "clearance_of",
+    "simulate",
+    "study",
+    "verify",
+]

@@ -1,24 +1,24 @@
 """Quasi-static motion of the object under the planned motion of the pusher."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ..contact import ContactMode, PointContact, two_point_sticks
-from ..contact.placement import SMOOTH_CORNER
 from ..errors import InputError
 from ..friction.surface import LimitSurface
-from ..geometry import compose, exp, inverse, perpendicular, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
-from ..problem import Object, Plan, Rollout, Scene
-from ..problem.mechanics import contacts_of, named, placement_of, surface_of, virtual_contact
+from ..problem import Plan, Rollout, Scene
+from ..problem.mechanics import named, placement_of, surface_of
 from ..problem.scene import Model
-from .pieces import Piece, Source, pieces
+from .corners import passed_a_corner
+from .pieces import Source
+from .plant import MODES, Plant
+from .plant.plant import OUTCOMES
+from .stretches import Stretch, stretches
 
-# Longest travel of the pusher in one integration step [m]; the error of a step is its fifth power over L⁴.
-STEP = 0.001
-# A gap up to this counts as touching [m]; the simulation removes what drift leaves.
-TOUCHING = 1e-9
+REST, STICKING, _, _, SEPARATION = range(5)  # codes of MODES
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Perturbation:
     """What differs from the plan in a perturbed run: standard deviations of the start pose and of friction.
 
     Attributes:
-        position: of the start, each axis [m] (one finger only; two would need the landing's two-contact motion).
-        angle: of the start [rad] (one finger only).
+        position: of the start, each axis [m].
+        angle: of the start [rad].
         friction: of the coefficient, relative.
     """
 
@@ -50,11 +50,10 @@ def simulate(
     source: Source = "arcs",
     perturbation: Perturbation | None = None,
 ) -> Rollout:
-    """Rolls a plan out.
+    """Rolls a plan out: the fingers move as planned, the object as contact and table let it.
 
-    One finger: stick, slide left, slide right, separation, touching again, and rolling of the round tip on the outline.
-    Two fingers: the object keeps the hand's motion while the twist lies in the composite cone; leaving it ends the run
-    as "left the cone".
+    Each finger sticks, slides left or right, separates, touches again, rolls with its round tip and goes round corners
+    (simulation.plant). Where it lands on the object, the object is moved aside first.
 
     Args:
         seed: of the perturbation; without one the run is the nominal one.
@@ -67,185 +66,126 @@ def simulate(
     if plan.status != "solved":
         raise InputError("there is no plan to roll out", hint=plan.reason)
     scene = plan.scene
-    start = np.asarray(scene.start, dtype=float)
     if perturbation is not None:
         rng = np.random.default_rng(seed)
         noise, relative_friction = rng.standard_normal(3), rng.standard_normal()
         scale = np.array([perturbation.position, perturbation.position, perturbation.angle])
-        if all(len(p.fingers) == 1 for p in plan.pushes):
-            start = start + scale * noise
         mu = scene.object.friction * max(0.0, 1 + perturbation.friction * relative_friction)
-        scene = replace(scene, object=_with_friction(scene, mu))
-    run = _Run(scene, plan, model, start)
-    for piece in pieces(plan.segments, np.asarray(plan.scene.start, dtype=float), source):
-        if not run.advance(piece):
-            break
-    return run.rollout(None if perturbation is None else seed)
-
-
-class _Run:
-    """The state of one rollout: pose of the object, contact, and what was recorded."""
-
-    def __init__(self, scene: Scene, plan: Plan, model: Model, start: Array) -> None:
-        self.scene, self.plan, self.model = scene, plan, model
-        self.q = start
-        self.touching = False
-        self.outcome = "completed"
-        self.push: int | None = None  # of the segment under way, None in a transit
-        self.fingers = 1
-        self.X_OE = np.zeros(3)
-        self.last_twist: Array | None = None
-        first = plan.segments[0].pusher[0] if plan.segments else start
-        self.times, self.object, self.pusher = [0.0], [start], [np.asarray(first)]
-        self.modes: list[str] = [ContactMode.REST.value]
-        self.surface: LimitSurface
-        self.contacts: tuple[PointContact, ...]
-        if plan.pushes:
-            self._prepare(0)
-
-    def rollout(self, seed: int | None) -> Rollout:
-        times, poses, pusher = (np.array(x) for x in (self.times, self.object, self.pusher))
-        return Rollout(self.q, times, poses, pusher, tuple(self.modes), self.outcome, seed)
-
-    def advance(self, piece: Piece) -> bool:
-        """Moves on by one piece; False when the run has ended."""
-        if piece.push != self.push:
-            if self.push is not None:
-                if not self.touching:
-                    self.outcome = "lost contact"
-                    return False
-                self.touching = False
-            self.push = piece.push
-            if piece.push is not None:
-                self._prepare(piece.push)
-                self.X_OE = relative(self.q, piece.pusher)
-        mode, going = ContactMode.REST, True
-        if self.fingers == 2 and piece.push is not None:
-            mode, going = self._carry(piece)
-        elif self.fingers == 1 and not piece.lifted:
-            mode = self._press(piece)
-        self.times.append(piece.time + piece.duration)
-        self.object.append(self.q)
-        self.pusher.append(piece.pusher_at(1.0))
-        self.modes.append(mode.value)
-        return going
-
-    def _prepare(self, index: int) -> None:
-        """Fingers, contacts and limit surface of a push."""
-        push = named(self.scene, self.plan.pushes[index].push)
-        placement = placement_of(self.scene, push)
-        p = virtual_contact(self.scene, placement).point
-        self.fingers = push.fingers
-        self.surface = surface_of(self.scene.object, self.model, -p / np.hypot(*p))
-        self.contacts = contacts_of(self.scene, placement)
-        self.last_twist = None
-
-    def _carry(self, piece: Piece) -> tuple[ContactMode, bool]:
-        """Two fingers: the object keeps its pose in the hand while the composite cone holds its wrench."""
-        twist = piece.object_step
-        if not piece.body:
-            twist = np.array([*rotate(-piece.object[2] - 0.5 * twist[2], twist[:2]), twist[2]])
-        size = float(np.linalg.norm(twist))
-        if size > 0:
-            direction = twist / size
-            if self.last_twist is None or np.max(np.abs(direction - self.last_twist)) > 1e-9:
-                V = shift_twist(twist, self.scene.object.cof)
-                if not two_point_sticks(self.contacts, self.surface, V):
-                    self.outcome = "left the cone"
-                    return ContactMode.SEPARATION, False
-                self.last_twist = direction
-        self.q = compose(piece.pusher_at(1.0), inverse(self.X_OE))
-        self.touching = True
-        return ContactMode.STICKING, True
-
-    def _press(self, piece: Piece) -> ContactMode:
-        """One finger: classical Runge-Kutta steps while it touches, a search for the touch while it does not."""
-        travel = (
-            float(np.hypot(*piece.pusher_step[:2]))
-            + abs(piece.pusher_step[2]) * self.scene.object.outline.size
+        scene = replace(
+            scene, start=scene.start_pose + scale * noise, object=replace(scene.object, friction=mu)
         )
-        n = max(1, int(np.ceil(travel / STEP)))
-        mode = ContactMode.REST
-        for i in range(n):
-            low, high = i / n, (i + 1) / n
-            if not self.touching:
-                touch = self._touch(piece, low, high)
-                if touch is None:
-                    mode = ContactMode.SEPARATION
-                    continue
-                self.touching, low = True, touch
-            mode = self._step(piece, low, high)
-            if mode is ContactMode.SEPARATION:
-                self.touching = False
-        return mode
-
-    def _touch(self, piece: Piece, low: float, high: float) -> float | None:
-        """When the finger touches the resting object, by bisection; None if it does not."""
-        if self._gap(piece, high)[0] > TOUCHING:
-            return None
-        if self._gap(piece, low)[0] <= TOUCHING:
-            return low
-        a, b = low, high
-        for _ in range(50):
-            middle = 0.5 * (a + b)
-            a, b = (middle, b) if self._gap(piece, middle)[0] > 0 else (a, middle)
-        return b
-
-    def _gap(self, piece: Piece, fraction: float) -> tuple[float, Array, Array, Array]:
-        return self._contact(self.q, piece.pusher_at(fraction)[:2])
-
-    def _contact(self, q: Array, tip_W: Array) -> tuple[float, Array, Array, Array]:
-        """Gap, contact point and inward normal in O, and the tip's centre in O."""
-        tip = transform(inverse(q), tip_W)
-        found = self.scene.object.outline.nearest(tip)
-        normal, point = found.normal, found.point
-        if found.corner and found.distance > 1e-9 * self.scene.object.outline.size:
-            normal = (point - tip) / np.hypot(*(point - tip))
-            if np.arccos(np.clip(normal @ found.normal, -1.0, 1.0)) > SMOOTH_CORNER and self.touching:
-                self.outcome = "passed a corner"
-        return found.distance - self.scene.pusher.tip_radius, point, normal, tip
-
-    def _twist(self, q: Array, piece: Piece, fraction: float) -> tuple[Array, ContactMode]:
-        """Body twist of the object in O per whole piece, and the contact mode."""
-        pusher, velocity = piece.pusher_at(fraction), piece.pusher_velocity(fraction)
-        _, point, normal, tip = self._contact(q, pusher[:2])
-        lever = rotate(q[2], point - tip)
-        u = rotate(-q[2], velocity[:2] + velocity[2] * perpendicular(lever))
-        cof = self.scene.object.cof
-        contact = PointContact(point - cof, normal, self.scene.object.friction, hook=True)
-        motion = contact.motion(self.surface, u)
-        return shift_twist(motion.twist, -cof), motion.mode
-
-    def _step(self, piece: Piece, low: float, high: float) -> ContactMode:
-        """A step of the fourth-order Runge-Kutta-Munthe-Kaas method: exact where the twist is constant."""
-        h, q = high - low, self.q
-        twist, mode = self._twist(q, piece, low)
-        if mode is ContactMode.SEPARATION or mode is ContactMode.REST:
-            return mode
-        slopes = [twist]
-        for part in (0.5, 0.5, 1.0):
-            moved = part * h * slopes[-1]
-            twist, mode_end = self._twist(compose(q, exp(moved)), piece, low + part * h)
-            slopes.append(_slope(moved, twist))
-        k1, k2, k3, k4 = slopes
-        self.q = compose(q, exp(h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))
-        gap, _, normal, _ = self._gap(piece, high)
-        if mode_end is not ContactMode.SEPARATION and abs(gap) < 0.1 * STEP:
-            # Remove the drift off the outline that the step's error leaves.
-            self.q = self.q - np.array([*(gap * rotate(self.q[2], normal)), 0.0])
-        return mode
+    rolled = roll(plan, [scene], model, source)
+    n = int(np.count_nonzero(np.isfinite(rolled.object[0, :, 0])))
+    return Rollout(
+        rolled.final[0],
+        rolled.times[:n],
+        rolled.object[0, :n],
+        rolled.pusher[:n],
+        tuple(MODES[code] for code in rolled.modes[0, :n]),
+        rolled.outcomes[0],
+        None if perturbation is None else seed,
+    )
 
 
-def _slope(moved: Array, twist: Array) -> Array:
-    """Rate of the displacement's logarithm when the body, displaced by exp(moved), has a body twist."""
-    first = _bracket(moved, twist)
-    return twist + 0.5 * first + _bracket(moved, first) / 12
+@dataclass(frozen=True, eq=False)
+class Rolled:
+    """Many runs of one plan; n runs, m samples of the plan.
+
+    Attributes:
+        final: X_WO at the end, shape (n, 3).
+        outcomes: n words, as of a Rollout.
+        sticking: whether every finger stuck from its first touch in each push to the push's end, shape (n,).
+        times, pusher: of the samples, shapes (m,) and (m, 3).
+        object: X_WO at the samples, shape (n, m, 3); nan after the end of a run.
+        modes: codes of plant.MODES, shape (n, m). Of two fingers: sticking where both stick, separation where one is
+            off the object, else how one slides.
+    """
+
+    final: Array
+    outcomes: tuple[str, ...]
+    sticking: Any
+    times: Array
+    pusher: Array
+    object: Array
+    modes: Any
 
 
-def _bracket(a: Array, b: Array) -> Array:
-    """The Lie bracket of two plane twists."""
-    return np.array([*(a[2] * perpendicular(b[:2]) - b[2] * perpendicular(a[:2])), 0.0])
+def roll(plan: Plan, scenes: Sequence[Scene], model: Model, source: Source) -> Rolled:
+    """Every scene holds a start and an object of its own, of one outline; the pusher moves as planned.
+
+    Args:
+        model, source: as of simulate.
+    """
+    way = stretches(plan, source)
+    n = len(scenes)
+    q = np.array([scene.start_pose for scene in scenes])
+    going, outcomes = np.ones(n, dtype=bool), np.full(n, "completed", dtype=object)
+    sticking = np.ones(n, dtype=bool)
+    objects, modes = [q[:, None].copy()], [np.zeros((n, 1), dtype=int)]
+    times, hands = [np.zeros(1)], [way[0].hand[:1] if way else q[:1]]
+    for stretch in way:
+        poses = np.full((n, len(stretch.hand), 3), np.nan)
+        seen = np.zeros((n, len(stretch.hand)), dtype=int)
+        here = np.flatnonzero(going)
+        if stretch.lifted:
+            poses[here] = q[here, None]
+        elif len(here):
+            runs = _push(plan, [scenes[int(i)] for i in here], stretch, q[here], model)
+            touching = (runs.modes != SEPARATION) & (runs.modes != REST)
+            poses[here], seen[here] = runs.object, _together(runs.modes)
+            q[here] = runs.final
+            for code in np.unique(runs.outcome[runs.outcome > 0]):
+                stopped = here[runs.outcome == code]
+                outcomes[stopped], going[stopped], sticking[stopped] = OUTCOMES[code], False, False
+            if stretch.push is not None:
+                touched = np.logical_or.accumulate(touching, axis=1)
+                sticking[here] &= np.all(~touched | (runs.modes == STICKING), axis=(1, 2))
+                lost = here[~np.any(touching[:, -1], axis=1) & (runs.outcome == 0)]
+                outcomes[lost], going[lost], sticking[lost] = "lost contact", False, False
+                corner = here[passed_a_corner(plan.scene.object.outline, runs.points, touching)]
+                outcomes[corner] = np.where(
+                    outcomes[corner] == "completed", "passed a corner", outcomes[corner]
+                )
+        objects.append(poses[:, 1:])
+        modes.append(seen[:, 1:])
+        times.append(stretch.times[1:])
+        hands.append(stretch.hand[1:])
+    return Rolled(
+        q,
+        tuple(outcomes),
+        sticking,
+        np.concatenate(times),
+        np.concatenate(hands),
+        np.concatenate(objects, axis=1),
+        np.concatenate(modes, axis=1),
+    )
 
 
-def _with_friction(scene: Scene, friction: float) -> Object:
-    return replace(scene.object, friction=friction)
+def _push(plan: Plan, scenes: Sequence[Scene], stretch: Stretch, q: Array, model: Model) -> Any:
+    """The runs of one stretch on the table."""
+    segment = plan.pushes[stretch.fingers]
+    contact = placement_of(plan.scene, named(plan.scene, segment.push)).virtual_point
+    surfaces = [_surface(scene, contact, model) for scene in scenes]
+    thing = scenes[0].object
+    plant = Plant(thing, segment.fingers, plan.scene.pusher.tip_radius, surface=surfaces[0])
+    same = all(surface is surfaces[0] for surface in surfaces)
+    return plant.many(
+        q,
+        stretch.hand,
+        friction=[scene.object.friction for scene in scenes],
+        surfaces=None if same else surfaces,
+        cofs=np.array([scene.object.cof for scene in scenes]),
+        body=stretch.body,
+        record=True,
+    )
+
+
+def _surface(scene: Scene, contact: Array, model: Model) -> LimitSurface:
+    p = scene.object.cof - contact
+    return surface_of(scene.object, model, p / np.hypot(*p))
+
+
+def _together(modes: Any) -> Any:
+    """One mode for all fingers, codes (..., k) to (...)."""
+    least, most = modes.min(axis=-1), modes.max(axis=-1)
+    return np.where(least == REST, most, np.where(most == SEPARATION, SEPARATION, most))

@@ -81,7 +81,7 @@ class PlantRuns:
         final: X_WO at the end, shape (n, 3).
         outcome: codes, shape (n,); OUTCOMES[code] is the word.
         stuck: whether no finger slid in a step, shape (n,). It may have been off the object.
-        object, modes: the way, shapes (n, m, 3) and (n, m, k), if it was recorded; else None.
+        object, modes, points: the way, shapes (n, m, 3), (n, m, k) and (n, m, k, 2), if it was recorded; else None.
     """
 
     final: Array
@@ -89,6 +89,7 @@ class PlantRuns:
     stuck: Any
     object: Array | None = None
     modes: Any = None
+    points: Array | None = None
 
 
 class Plant:
@@ -262,7 +263,7 @@ class Plant:
             list(pool.map(chunk, range(size, n, size)))
         bits = seen[..., 4].astype(int)
         stuck = ~np.any(bits & 0b1100, axis=(1, 2))
-        way = (poses, seen[..., 0].astype(np.int8)) if record else (None, None)
+        way = (poses, seen[..., 0].astype(np.int8), seen[..., 1:3]) if record else (None, None, None)
         return PlantRuns(poses[:, -1], outcome, stuck, *way)
 
     def _hands(self, hand: ArrayLike) -> Array:

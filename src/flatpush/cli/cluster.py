@@ -1,0 +1,77 @@
+"""Spreads a study over the processes of a Dask cluster: a local one, or one that exists."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from ..errors import FlatpushError, InputError, MissingExtra
+
+PATIENCE = 8.0  # [s] for a scheduler to answer
+
+
+@contextmanager
+def cluster(scheduler: str | None) -> Iterator[Any]:
+    """A function like map whose calls run on the workers of the scheduler at an address, or of a local cluster.
+
+    Raises:
+        MissingExtra: without dask.distributed.
+        InputError: if no scheduler answers at the address within a few seconds.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtra('a cluster needs dask.distributed: pip install "flatpush[cluster]"') from None
+    import dask
+
+    with dask.config.set(
+        {"distributed.comm.timeouts.connect": PATIENCE, "distributed.logging.distributed": "critical"}
+    ):
+        if scheduler is None:
+            with (
+                distributed.LocalCluster(
+                    processes=True,
+                    threads_per_worker=1,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                ) as local,
+                distributed.Client(local) as client,
+            ):
+                yield _mapper(client)
+            return
+        try:
+            client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        except (OSError, TimeoutError, ValueError, TypeError) as error:
+            raise InputError(
+                f"no Dask scheduler answers within {PATIENCE:.0f} s",
+                key="--scheduler",
+                value=scheduler,
+                hint="Start one with: dask scheduler; its address looks like tcp://host:8786.",
+            ) from error
+        with client:
+            if not client.scheduler_info()["workers"]:
+                try:
+                    client.wait_for_workers(1, timeout=PATIENCE)
+                except TimeoutError:
+                    raise InputError(
+                        "the scheduler has no workers",
+                        key="--scheduler",
+                        value=scheduler,
+                        hint=f"Start some with: dask worker {scheduler}",
+                    ) from None
+            yield _mapper(client)
+
+
+def _mapper(client: Any) -> Any:
+    def spread(function: Any, chunks: Any) -> list[Any]:
+        futures = client.map(function, chunks, pure=False)
+        try:
+            return list(client.gather(futures))
+        except FlatpushError:
+            raise
+        except Exception as error:
+            raise FlatpushError(f"a worker failed: {type(error).__name__}: {error}") from error
+        finally:
+            client.cancel(futures)
+
+    return spread
