@@ -168,7 +168,17 @@ def test_interrupting_leaves_no_file(folder):
     (folder / "one.yaml").write_text(SCENE.replace("fingers: 2, spacing: 18, ", ""))
     flatpush("plan", "one.yaml", "-o", "plan.json", folder=folder)
     before = sorted(p.name for p in folder.iterdir())
-    command = [sys.executable, "-m", "flatpush", "simulate", "plan.json", "--runs", "50000", "-o", "runs.json"]
+    command = [
+        sys.executable,
+        "-m",
+        "flatpush",
+        "simulate",
+        "plan.json",
+        "--runs",
+        "50000",
+        "-o",
+        "runs.json",
+    ]
     running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
     time.sleep(3)
     running.send_signal(signal.SIGINT)

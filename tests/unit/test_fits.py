@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from flatpush.errors import InputError
-from flatpush.friction import Ellipsoid, Exact, Quartic, Support, fit_ellipsoid, fit_quartic, fit_surface
+from flatpush.friction import (
+    Ellipsoid,
+    Exact,
+    Quartic,
+    Support,
+    fit_ellipsoid,
+    fit_quartic,
+    fit_surface,
+    sized,
+)
 
 # The solver's own tolerance is 1e-9; the norm in the objective pulls by about its weight.
 TINY = 1e-6
@@ -130,3 +139,17 @@ def test_pairs_that_do_not_determine_a_surface(
 def test_a_quartic_needs_more_pairs() -> None:
     with pytest.raises(InputError, match="at least 15 pairs, got 14"):
         fit_quartic(W[:14], V[:14])
+
+
+def test_a_sized_surface_has_half_of_the_wrenches_inside_and_the_same_twists():
+    rng = np.random.default_rng(4)
+    twists = rng.normal(size=(41, 3)) * [1, 1, 30]
+    wrenches = Exact(Support.disc(0.05)).wrench(twists) * 7.0
+    for fit in (fit_ellipsoid, fit_quartic):
+        fitted = fit(wrenches, twists)
+        surface = sized(fitted, wrenches)
+        assert np.median(surface.value(wrenches)) == pytest.approx(1)
+        size = np.linalg.norm(surface.twist(wrenches), axis=1) / np.linalg.norm(
+            fitted.twist(wrenches), axis=1
+        )
+        assert np.ptp(size) < 1e-9 * size[0]

@@ -93,7 +93,7 @@ class _Found:
     def __init__(
         self, pairs: Any, places: Any, length: float | None, folds: int, seeds: int, model: str
     ) -> None:
-        from ..friction import fit_ellipsoid, fit_loads, fit_quartic
+        from ..friction import fit_ellipsoid, fit_loads, fit_quartic, sized
         from ..friction.cross_validation import Loads, Smooth, blended, choose, judge
         from ..friction.pairs import typical_length
 
@@ -105,7 +105,8 @@ class _Found:
             smooth = Smooth(name)  # type: ignore[arg-type]
             self.judged[name] = judge(pairs, smooth, seeds=range(seeds), **how)
             lam, beta = self.weights[name] = choose(pairs, smooth, **how)
-            self.fits[name] = fit(pairs.wrenches, pairs.twists, regularisation=lam, force_weight=beta)
+            fitted = fit(pairs.wrenches, pairs.twists, regularisation=lam, force_weight=beta)
+            self.fits[name] = sized(fitted, pairs.wrenches)
         self.loads = None
         if places is not None:
             loads = Loads(*places)

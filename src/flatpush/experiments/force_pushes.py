@@ -84,7 +84,7 @@ def known_places(name: str) -> tuple[Array, Array, Array]:
 
 
 def _draw(folder: Path, data: Path, judged: dict[str, dict[str, Judgement]]) -> None:
-    from ..friction import fit_ellipsoid, fit_loads, fit_quartic
+    from ..friction import fit_ellipsoid, fit_loads, fit_quartic, sized
     from ..view.angle_figure import angle_figure
     from ..view.surface_figure import surface_figure
 
@@ -103,10 +103,8 @@ def _draw(folder: Path, data: Path, judged: dict[str, dict[str, Judgement]]) -> 
         for model in (Smooth("quartic"), Smooth("ellipsoid")):
             lam, beta = choose(pairs, model, length=LENGTH, folds=FOLDS)
             fit = fit_quartic if model.name == "quartic" else fit_ellipsoid
-            smooth[model.name] = (
-                fit(pairs.wrenches, pairs.twists, regularisation=lam, force_weight=beta),
-                1.0,
-            )
+            fitted = fit(pairs.wrenches, pairs.twists, regularisation=lam, force_weight=beta)
+            smooth[model.name] = (sized(fitted, pairs.wrenches), 1.0)
         loads = fit_loads(pairs.wrenches, pairs.twists, places, parts, nominal=nominal, trust=0.5)
         surface_figure(
             {**smooth, "loads": (loads.surface, loads.resistance)},

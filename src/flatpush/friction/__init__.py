@@ -2,7 +2,7 @@
 
 from .ellipsoid import Ellipsoid
 from .exact import Exact
-from .fits import fit_ellipsoid, fit_quartic, fit_surface
+from .fits import fit_ellipsoid, fit_quartic, fit_surface, sized
 from .loads import LoadsFit, fit_loads
 from .local import local_ellipsoid
 from .pairs import Pairs
@@ -27,4 +27,5 @@ __all__ = [
     "fit_quartic",
     "fit_surface",
     "local_ellipsoid",
+    "sized",
 ]

@@ -150,6 +150,20 @@ def even_twists(length: float, octant: int = _OCTANT) -> Array:
     return (mirrors[:, None] * np.concatenate([V, V[:, [1, 0, 2]]])).reshape(-1, 3)
 
 
+def sized(surface: Ellipsoid | Quartic, wrenches: ArrayLike) -> Ellipsoid | Quartic:
+    """The same surface in another size: half of the wrenches lie inside it. No direction of a twist changes.
+
+    A fit pays for the norm of its coefficients, so that its surface comes out too large for the forces themselves.
+
+    Args:
+        wrenches: measured ones, shape (n, 3).
+    """
+    middle = float(np.median(surface.value(wrenches)))
+    if isinstance(surface, Ellipsoid):
+        return Ellipsoid(surface.matrix / middle, fit=surface.fit)
+    return Quartic(surface.coefficients / middle, gram=surface.gram / middle, fit=surface.fit)
+
+
 @cache
 def _grams() -> tuple[Array, Array]:
     """The Gram matrices (24, 9, 9) of the 15 monomials and of zero, and the same as columns for the solver."""
