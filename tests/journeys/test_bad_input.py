@@ -288,9 +288,9 @@ CASES: list[tuple[str, dict[str, Any], list[str]]] = [
         ["workspace.obstacles[1]:", "cross"],
     ),
     (
-        "no true cone yet",
-        {"planning": {"two_finger": "cone"}},
-        ["planning.two_finger:", "not available yet", "middle"],
+        "no such contact of two fingers",
+        {"planning": {"two_finger": "cones"}},
+        ["planning.two_finger:", "cone", "middle"],
     ),
     (
         "whole margin",

@@ -143,7 +143,7 @@ def test_defaults_are_the_same_lengths_in_every_unit() -> None:
         assert scene.pusher == Pusher(1, 0.0, 0.0025, 0.02, 0.1, 0.002, True, "lift", 0.03)
         tolerance = (0.0005, 0.0005, float(np.deg2rad(0.5)))
         assert scene.planning == Planning(
-            "exact", "middle", "flat", 0.03, 0.2, 0.0, tolerance, False, 0, 10000, 5.0
+            "exact", "cone", "flat", 0.03, 0.2, 0.0, tolerance, False, 0, 10000, 5.0
         )
         assert scene.pushes == "auto"
         assert scene.workspace.bounds is None

@@ -50,6 +50,7 @@ def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
     car = described.option.car
     found: dict[str, Any] = {
         "name": described.push.name,
+        "fingers": described.push.fingers,
         "at": [float(x) for x in described.push.at.point],
         "normal": [float(x) for x in described.push.at.normal],
         "refusal": described.option.refusal or None,
@@ -60,6 +61,7 @@ def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
         u_left, u_right = car.contact.motion_cone(car.surface)
         angles = car.contact.force_angles([u_left, u_right])
         found |= {
+            "composite": car.cone is not None,
             "cone_degrees": [math.degrees(float(a)) for a in car.contact.force_angles(car.forces[[0, 2]])],
             "motion_cone_degrees": [math.degrees(float(a)) for a in angles],
             "flat_point": [float(x) for x in car.flat_point],
@@ -72,6 +74,7 @@ def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
 
 
 def _tell(data: dict[str, Any]) -> None:
+    from ..planning.description import MIDDLE
     from ..planning.freedom import WORDS
 
     mm = 1000.0
@@ -90,8 +93,9 @@ def _tell(data: dict[str, Any]) -> None:
             typer.echo(f"  cannot steer: {push['refusal']}")
         else:
             z, c = push["flat_point"], push["cone_degrees"]
+            edges = "forces of the turns" if push["composite"] else "friction cone"
             typer.echo(
-                f"  friction cone {c[1]:+.1f}° to {c[0]:+.1f}°, motion cone {push['motion_cone_degrees'][1]:+.1f}°"
+                f"  {edges} {c[1]:+.1f}° to {c[0]:+.1f}°, motion cone {push['motion_cone_degrees'][1]:+.1f}°"
                 f" to {push['motion_cone_degrees'][0]:+.1f}° about the inward normal (+ is left)"
             )
             left, right = push["left_centre"], push["right_centre"]
@@ -100,12 +104,13 @@ def _tell(data: dict[str, Any]) -> None:
                 f" right about ({mm * right[0]:.1f}, {mm * right[1]:.1f}) mm;"
                 f" flat point ({mm * z[0]:.1f}, {mm * z[1]:.1f}) mm"
             )
-            typer.echo(
-                f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm"
-            )
+            if push["fingers"] == 1:
+                typer.echo(
+                    f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm"
+                )
         radii = {k: ("—" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
         typer.echo("  turning radius [mm]: " + ", ".join(f"{k} {r}" for k, r in radii.items()))
-        known = [r for r in push["radii"].values() if r is not None]
+        known = [r for k, r in push["radii"].items() if r is not None and k != MIDDLE]
         if known and max(known) > 1.5 * min(known):
             typer.echo(
                 f"  the radius depends on the assumption by a factor of {max(known) / min(known):.1f}:"

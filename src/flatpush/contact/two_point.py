@@ -11,9 +11,7 @@ from ..friction.surface import LimitSurface, WrenchSet
 from ..geometry import cross
 from ..geometry.pose import Array
 from .point_contact import PointContact
-
-# Relative slack of the closed cone, above rounding and below any physical meaning.
-CLOSED = 1e-9
+from .wrench_cone import CLOSED, shared
 
 
 def two_point_sticks(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> bool:
@@ -48,6 +46,29 @@ def composite_margin(contacts: Sequence[PointContact], surface: LimitSurface, tw
             break
         low, high = (low, middle) if sticks(middle) else (middle, high)
     return 1.0 - high
+
+
+def spacing_margin(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> float:
+    """The fraction of their distance by which two fingers could move together before the twist no longer sticks.
+
+    1 where they could stand at one place, 0 on the cone's boundary, negative (down to -9) if they stand too close. On
+    curved sides, where moving would change the normals: twice the part of the load that the lighter one bears at
+    least (see wrench_cone.shared).
+    """
+    wrenches = surface.wrench_set(twist)
+
+    def sticks(fraction: float) -> bool:
+        return shared(contacts, 0.5 * fraction).depths(wrenches)[1] >= -CLOSED
+
+    if sticks(1.0):
+        return 1.0
+    low, high = (0.0, 1.0) if sticks(0.0) else (-9.0, 0.0)
+    if low < 0 and not sticks(low):
+        return -9.0
+    while high - low > 1e-10:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sticks(middle) else (low, middle)
+    return low
 
 
 def _inside(contacts: Sequence[PointContact], wrenches: WrenchSet) -> bool:

@@ -293,7 +293,10 @@ class PlanningPart(Part):
     model: Literal["exact", "ellipsoid", "local", "quartic"] = Field(
         default="exact", description="exact, ellipsoid, local or quartic."
     )
-    two_finger: Literal["cone", "middle"] = Field(default="middle", description="cone or middle.")
+    two_finger: Literal["cone", "middle"] = Field(
+        default="cone",
+        description="cone (composite cone of both fingers) or middle (one contact between them).",
+    )
     cost: Literal["flat", "pusher", "time"] = Field(default="flat", description="flat, pusher or time.")
     switch_cost: NotNegative | None = Field(
         default=None,

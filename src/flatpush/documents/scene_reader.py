@@ -165,12 +165,6 @@ def _workspace(ctx: Context, part: m.WorkspacePart, obj: Object) -> Workspace:
 
 def _planning(ctx: Context, part: m.PlanningPart) -> Planning:
     given = {key: getattr(part, key) for key in part.model_fields_set}
-    if given.get("two_finger") == "cone":
-        raise ctx.refuse(
-            "the true composite cone of two fingers is not available yet",
-            "planning.two_finger",
-            hint="Use two_finger: middle.",
-        )
     margin = given.pop("margin", None)
     if margin is not None and "friction" in margin.model_fields_set:
         given["friction_margin"] = margin.friction

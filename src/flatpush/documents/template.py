@@ -56,7 +56,7 @@ goal: [0, 0, 0]
 # How to plan; every key may be left out, and the values here are the defaults.
 planning:
   model: exact                    # friction with the table: exact, ellipsoid, local or quartic
-  two_finger: middle              # two fingers are taken as one in the middle; cone is not available yet
+  two_finger: cone                # cone: all that both fingers can do; middle: as one finger between them
   cost: flat                      # what is kept short: flat (path of the car), pusher (its path) or time
   switch_cost: 30                 # of each change of contact, in the unit of the cost; 0 for pusher and time
   margin:

@@ -12,6 +12,7 @@ EXPERIMENTS = {
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
+    "cone": "two fingers with their composite cone against their virtual middle contact",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
 # Those that need the folder of recorded data.

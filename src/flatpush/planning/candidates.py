@@ -121,7 +121,7 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
             return np.inf
         pusher = scene.pusher
         push = Push(stretch.name, at, pusher.fingers, pusher.spacing if pusher.fingers == 2 else 0.0)
-        option = push_option(scene, push)
+        option = push_option(scene, push, quick=True)
         tried[fraction] = option
         return option.car.radius if option.car is not None else np.inf
 

@@ -6,11 +6,13 @@ import numpy as np
 
 from ..errors import FlatpushError
 from ..problem import Object, Push, Scene
-from ..problem.mechanics import divergence_length
+from ..problem.mechanics import divergence_length, takes_cone
 from ..problem.scene import MODELS, Model
 from ..steering.car import Car
 from .candidates import automatic_pushes
 from .options import PushOption, push_option
+
+MIDDLE = "middle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +22,8 @@ class PushDescription:
     Attributes:
         push: the push; option: its car under the scene's model, or the refusal.
         cars: car, or refusal in words, under each model and, as "exact, uniform" and "exact, outline", under the
-            exact surface for uniform pressure and for pressure along the outline.
+            exact surface for uniform pressure and for pressure along the outline. Of two fingers with their composite
+            cone also, as "middle", that of the virtual contact between them under the scene's model.
         divergence: L [m]: a small error of one finger grows e-fold per L of travel; nan without a contact.
     """
 
@@ -38,12 +41,15 @@ def describe(scene: Scene) -> tuple[PushDescription, ...]:
     else:
         pushes = scene.pushes
     assumed = {word: _with_support(scene, word) for word in ("uniform", "outline")}
+    between = replace(scene, planning=replace(scene.planning, two_finger="middle"))
     described = []
     for push in pushes:
         option = push_option(scene, push, margin=0.0)
         cars: dict[str, Car | str] = {model: _car(scene, push, model) for model in MODELS}
         for word, other in assumed.items():
             cars[f"exact, {word}"] = _car(other, push, "exact")
+        if takes_cone(scene, push.fingers):
+            cars[MIDDLE] = _car(between, push, scene.planning.model)
         length = divergence_length(scene.object, option.car.contact) if option.car else float("nan")
         described.append(PushDescription(push, option, cars, length))
     return tuple(described)

@@ -8,7 +8,15 @@ from ..contact import Placement, two_point_sticks
 from ..errors import FlatpushError, InputError
 from ..geometry import shift_twist, transform
 from ..problem import Push, Scene
-from ..problem.mechanics import contacts_of, placement_of, surface_of, true_surface, virtual_contact
+from ..problem.mechanics import (
+    cone_motions,
+    contacts_of,
+    placement_of,
+    surface_of,
+    takes_cone,
+    true_surface,
+    virtual_contact,
+)
 from ..problem.scene import Model
 from ..steering.car import Car
 
@@ -26,9 +34,12 @@ class PushOption:
 
 
 def push_option(
-    scene: Scene, push: Push, model: Model | None = None, margin: float | None = None
+    scene: Scene, push: Push, model: Model | None = None, margin: float | None = None, *, quick: bool = False
 ) -> PushOption:
-    """The car of a push under a model (default: the scene's) with a friction margin (default: the scene's)."""
+    """The car of a push under a model (default: the scene's) with a friction margin (default: the scene's).
+
+    quick is for comparing many places: the car of two fingers may then turn a little less tightly.
+    """
     placement = None
     try:
         placement = placement_of(scene, push)
@@ -37,6 +48,11 @@ def push_option(
         distance = float(np.hypot(*contact.point))
         towards = -contact.point / distance if distance > 0 else contact.normal
         surface = surface_of(scene.object, model or scene.planning.model, towards)
+        if takes_cone(scene, push.fingers):
+            contacts = contacts_of(scene, placement)
+            motions = cone_motions(scene, placement, surface, margin, quick=quick)
+            car = Car.of_two(contacts, surface, motions, cof=scene.object.cof, pusher=placement.pose)
+            return PushOption(push, placement, car)
         car = Car.of(
             contact,
             surface,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import FlatpushError, InputError
+from ..errors import FlatpushError
 from ..geometry import pose_error
 from ..geometry.pose import Array
 from ..problem import Certificate, Plan, Scene
@@ -53,13 +53,6 @@ class Planner:
     """
 
     def __init__(self, scene: Scene, tree: bool | str | Path = True) -> None:
-        if scene.planning.two_finger == "cone":
-            raise InputError(
-                "two_finger: cone, the true composite cone, is not available yet",
-                key="planning.two_finger",
-                value="cone",
-                hint="Use middle, the virtual middle contact.",
-            )
         self.left_out: tuple[PushOption, ...] = ()
         if scene.pushes == "auto":
             pushes, self.left_out = automatic_pushes(scene)

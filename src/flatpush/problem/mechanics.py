@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..contact import Placement, PointContact, place_fingers
+from ..contact import Placement, PointContact, cone_twists, place_fingers
 from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import OutlinePoint
@@ -39,6 +39,45 @@ def virtual_contact(scene: Scene, placement: Placement) -> PointContact:
     return PointContact(
         placement.virtual_point - scene.object.cof, placement.virtual_normal, scene.object.friction, hook=True
     )
+
+
+def takes_cone(scene: Scene, fingers: int) -> bool:
+    """Whether a push with so many fingers makes the motions of their composite cone (two_finger: cone)."""
+    return fingers == 2 and scene.planning.two_finger == "cone"
+
+
+def cone_motions(
+    scene: Scene,
+    placement: Placement,
+    surface: LimitSurface,
+    margin: float | None = None,
+    *,
+    quick: bool = False,
+) -> Array:
+    """Left turn, straight motion and right turn of two fingers' composite cone about the COF, shape (3, 3).
+
+    They suit the scene's cost; the margin is the scene's unless given. See contact.cone_twists.
+    """
+    planning = scene.planning
+    places = placement.tips if planning.cost == "time" else placement.pose[None, :2]
+    return cone_twists(
+        contacts_of(scene, placement),
+        surface,
+        planning.friction_margin if margin is None else margin,
+        places - scene.object.cof,
+        planning.cost,
+        quick=quick,
+    )
+
+
+def slider_of(thing: Object) -> Array:
+    """Corners (n, 2) that enclose the object, about its COF; of a circle, of a polygon around it."""
+    outline = thing.outline
+    if not outline.is_circle:
+        return np.asarray(outline.vertices - thing.cof)
+    turns = 2 * np.pi * np.arange(360) / 360
+    ring = outline.radius / np.cos(np.pi / 360) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return np.asarray(outline.centre + ring - thing.cof)
 
 
 def contact_at(scene: Scene, at: OutlinePoint) -> PointContact:

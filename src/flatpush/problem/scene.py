@@ -131,7 +131,7 @@ class Planning:
     """How to plan; the defaults are those of the scene document, in SI."""
 
     model: Model = "exact"
-    two_finger: Literal["cone", "middle"] = "middle"
+    two_finger: Literal["cone", "middle"] = "cone"
     cost: Literal["flat", "pusher", "time"] = "flat"
     switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
     friction_margin: float = 0.2

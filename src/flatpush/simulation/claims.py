@@ -5,22 +5,26 @@ from typing import Any
 
 import numpy as np
 
-from ..contact import Placement, PointContact, composite_margin, steering_forces
+from ..contact import Placement, PointContact, beyond_slider, composite_margin, steering_forces
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, pose_error, relative, rotate, shift_twist, transform, velocity_at
 from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, TransitSegment
 from ..problem.mechanics import (
+    cone_motions,
     contact_at,
     contacts_of,
     divergence_length,
     named,
     placement_of,
+    slider_of,
     surface_of,
+    takes_cone,
     true_surface,
     virtual_contact,
 )
 from .clearance import clearance_of
+from .cone_margins import cone_margins
 from .pieces import pieces, progress, turns_along
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
@@ -34,15 +38,23 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
     Returns:
         goal_error: final pose less the goal (x, y, θ) by integrating the arcs' twists [m, m, rad].
         friction_margin: worst over all twists, and over all forces consistent with each: the fraction of μ that can be
-            lost before the contact slips, under the planning model (two fingers in the middle: the virtual contact).
+            lost before the contact slips, under the planning model (two fingers in the middle: the virtual contact;
+            two fingers with their cone: before the twist leaves it).
         friction_margin_degrees: the same as an angle between force and cone edge.
+        spacing_margin: two fingers with their cone: the fraction of their spacing that can be lost likewise, or twice
+            the part of the load that the lighter finger bears at least; else null.
         motion_cone_margin_degrees: angle between the pusher's velocity and the nearer motion-cone edge, or the
-            outline's tangent, beyond which the fingertip leaves.
-        curvature_margin: 1 - turn per travel of the contact / the most among forces of the whole friction cone.
+            outline's tangent, beyond which the fingertip leaves. Of a cone: by how much the velocity midway between
+            the contacts may turn while ω stays.
+        curvature_margin: 1 - turn per travel of the contact / the most among forces of the whole friction cone; of a
+            composite cone, the most with the same velocity midway between the contacts.
         composite_margin: two fingers: the fraction of μ that can be lost before a twist leaves the true composite
             cone of both contacts, under the believed surface; null with one finger.
+        uniqueness_margin: two fingers on a straight side: how far the turning centres used lie, at least, outside the
+            strip square to the contact that encloses the object [m]. Where it is positive, sticking is the only motion
+            that can happen, whatever the pressure ([Lynch1996] Theorem 4). null otherwise, and without a turn.
         model_offset: how far the believed surface's line of force passes from the contact, at worst [m]: 0 when the
-            planning model is exact.
+            planning model is exact; null where two fingers use their cone.
         growth: one finger: factor e^(ℓ/L) by which a small error of the bearing contact → COF grows; null with two.
         clearance: least distance to obstacles and bounds [m]; null without any.
         cost, duration: recomputed. cars: turning centres and straight direction of each push used, in O.
@@ -57,9 +69,16 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
         placement = placement_of(scene, named(scene, segment.push))
         contact = virtual_contact(scene, placement)
         surface = surface_of(scene.object, scene.planning.model, -contact.point / np.hypot(*contact.point))
-        cars.setdefault(segment.push, _centres(scene, contact, surface))
+        cone = takes_cone(scene, len(segment.fingers))
+        if segment.push not in cars:
+            cars[segment.push] = (
+                _of_twists(scene, cone_motions(scene, placement, surface))
+                if cone
+                else _centres(scene, contact, surface)
+            )
         for twist, at in _twists(scene, segment, contact):
-            for key, value in _margins(scene, surface, at, twist, placement).items():
+            found = (_cone_margins if cone else _margins)(scene, surface, at, twist, placement)
+            for key, value in found.items():
                 worst[key] = min(worst.get(key, np.inf), value)
         cost += sum(arc_costs(scene, segment, cars[segment.push]))
         cost += scene.planning.switching if previous not in (None, segment.push) else 0.0
@@ -84,9 +103,11 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
         "duration": duration,
         "friction_margin": worst.get("friction"),
         "friction_margin_degrees": worst.get("degrees"),
+        "spacing_margin": worst.get("spacing"),
         "motion_cone_margin_degrees": worst.get("motion"),
         "curvature_margin": worst.get("curvature"),
         "composite_margin": worst.get("composite"),
+        "uniqueness_margin": worst.get("unique"),
         "model_offset": None if offset is None else -offset,
         "growth": growth,
         "clearance": clearance_of(scene, segments),
@@ -136,12 +157,32 @@ def _margins(
     }
     true = true_surface(scene.object)
     if len(placement.points) == 2:
-        margins["composite"] = composite_margin(contacts_of(scene, placement), true, twist)
+        margins |= _two_finger_margins(scene, placement, twist)
     W = true.wrench(twist)
     lever = W[2] - (contact.point[0] * W[1] - contact.point[1] * W[0])
     size = float(np.hypot(W[0], W[1]))
     free = true.wrench_set(twist).radius
     margins["minus_offset"] = -float(abs(lever) / size) if size > 0 and free == 0 else 0.0
+    return margins
+
+
+def _cone_margins(
+    scene: Scene, surface: LimitSurface, contact: PointContact, twist: Array, placement: Placement
+) -> dict[str, float]:
+    """The margins of one twist about the COF, of two fingers with their composite cone."""
+    contacts = contacts_of(scene, placement)
+    return cone_margins(contacts, surface, contact.point, twist) | _two_finger_margins(
+        scene, placement, twist
+    )
+
+
+def _two_finger_margins(scene: Scene, placement: Placement, twist: Array) -> dict[str, float]:
+    """What both contacts make of a twist under the believed surface, and whatever the pressure."""
+    contacts = contacts_of(scene, placement)
+    margins = {"composite": composite_margin(contacts, true_surface(scene.object), twist)}
+    beyond = beyond_slider(contacts, slider_of(scene.object), twist)
+    if beyond is not None and np.isfinite(beyond):
+        margins["unique"] = beyond
     return margins
 
 
@@ -158,6 +199,13 @@ def _curvature_margin(surface: LimitSurface, contact: PointContact, twist: Array
     turn = float(twist[2]) / float(np.hypot(*velocity_at(twist, contact.point)))
     most = float(np.max(turns) if turn > 0 else np.min(turns))
     return 1 - turn / most if most * turn > 0 else -9.0
+
+
+def _of_twists(scene: Scene, twists: Array) -> dict[str, list[float]]:
+    """Turning centres and straight direction, in O, of a left turn, a straight motion and a right turn."""
+    centres = np.stack([-twists[:, 1], twists[:, 0]], axis=1)[[0, 2]] / twists[[0, 2], 2:] + scene.object.cof
+    names = {"left_centre": centres[0], "right_centre": centres[1], "straight": twists[1, :2]}
+    return {name: [float(x) for x in value] for name, value in names.items()}
 
 
 def _centres(scene: Scene, contact: PointContact, surface: LimitSurface) -> dict[str, list[float]]:

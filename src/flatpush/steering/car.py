@@ -1,14 +1,16 @@
 """The car that a sticking push makes of an object: left about one point, right about another, or straight on."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..contact import PointContact, steering_forces
+from ..contact import PointContact, WrenchCone, steering_forces
+from ..contact.wrench_cone import CLOSED
 from ..errors import InputError, NoDubinsReduction
 from ..friction.surface import LimitSurface
-from ..geometry import cross, rotate, shift_twist, velocity_at
+from ..geometry import cross, perpendicular, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
 
 
@@ -27,8 +29,9 @@ class Car:
         pusher: X_OE, shape (3,).
         contact, surface: in B (origin at the COF).
         forces: unit forces at the contact on the left edge, straight and on the right edge, shape (3, 2), with the
-            margin taken off; the right one turns left.
+            margin taken off; the right one turns left. With a cone: the sums of both fingers' forces in these motions.
         cof: origin of B in O.
+        cone: composite wrench cone of two fingers, if its motions are taken from it; the contact is then their middle.
     """
 
     left_centre: Array
@@ -39,6 +42,43 @@ class Car:
     surface: LimitSurface
     forces: Array
     cof: Array
+    cone: WrenchCone | None = None
+
+    @classmethod
+    def of_two(
+        cls,
+        contacts: Sequence[PointContact],
+        surface: LimitSurface,
+        twists: ArrayLike,
+        *,
+        cof: ArrayLike = (0.0, 0.0),
+        pusher: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> "Car":
+        """The car of two fingers that makes given motions of their composite cone.
+
+        Args:
+            twists: left turn, straight motion and right turn about the COF, shape (3, 3); see contact.cone_twists.
+        """
+        V = np.asarray(twists, dtype=float)
+        offset = np.asarray(cof, dtype=float)
+        middle = PointContact(
+            np.mean([c.point for c in contacts], axis=0),
+            np.mean([c.normal for c in contacts], axis=0),
+            contacts[0].friction,
+            hook=True,
+        )
+        forces = np.array([surface.wrench(v)[:2] for v in V[::-1]])
+        return cls(
+            perpendicular(V[0, :2]) / V[0, 2] + offset,
+            perpendicular(V[2, :2]) / V[2, 2] + offset,
+            V[1, :2],
+            np.asarray(pusher, dtype=float),
+            middle,
+            surface,
+            forces / np.linalg.norm(forces, axis=1, keepdims=True),
+            offset,
+            WrenchCone.of(contacts),
+        )
 
     @classmethod
     def of(
@@ -118,13 +158,17 @@ class Car:
     def twist(self, curvature: float) -> Array:
         """The body twist with a given turn per length of the flat path, from -1/radius (right) to 1/radius (left).
 
-        Found on the limit surface itself, by bisection on the force.
+        Found on the limit surface itself, by bisection on the force. Two fingers with their cone: the sum of the
+        straight motion and of a turn that has this curvature, with which the flat point is one exactly; where the
+        limit surface bulges out of the cone there, the twist of the sum of their wrenches instead.
 
         Raises:
             InputError: if the curvature is beyond what the friction cone, less the margin, allows.
         """
         if abs(curvature) * self.radius > 1 + 1e-9:
             raise InputError(f"a curvature is at most {1 / self.radius:.6g} per metre", value=curvature)
+        if self.cone is not None:
+            return self._twist_of_two(self.cone, curvature)
         left, _, right = self.contact.force_angles(self.forces)
         turn = -np.inf
         V = np.zeros(3)
@@ -136,6 +180,35 @@ class Car:
             turn = float(V[2])
             left, right = (angle, right) if turn < curvature else (left, angle)
         return V
+
+    def _twist_of_two(self, cone: WrenchCone, curvature: float) -> Array:
+        extreme = self.left if curvature > 0 else self.right
+        V, W = (shift_twist(v, self.cof) for v in (self.straight, extreme))
+        flat = self.flat_point - self.cof
+        F, G = (self.surface.wrench(v) for v in (V, W))
+        F, G = F / np.linalg.norm(F[:2]), G / np.linalg.norm(G[:2])
+
+        def planar(s: float) -> Array:
+            return np.asarray((1 - s) * V + s * W)
+
+        def bent(s: float) -> Array:
+            return self.surface.twist((1 - s) * F + s * G)
+
+        def at(motion: Callable[[float], Array]) -> Array:
+            low, high = 0.0, 1.0
+            if abs(curvature) * self.radius >= 1 - 1e-12:
+                return W
+            for _ in range(60):
+                s = 0.5 * (low + high)
+                v = motion(s)
+                turn = abs(float(v[2])) / float(np.hypot(*velocity_at(v, flat)))
+                low, high = (s, high) if turn < abs(curvature) else (low, s)
+            return motion(0.5 * (low + high))
+
+        found = V if curvature == 0 else at(planar)
+        if cone.depths(self.surface.wrench_set(found))[1] < -CLOSED:
+            found = at(bent)
+        return shift_twist(found / np.hypot(*velocity_at(found, flat)), -self.cof)
 
     def weights(self, cost: str) -> tuple[float, float, float]:
         """Cost of a radian to the left, a metre straight and a radian to the right, for the cost "flat" or "pusher"."""

@@ -10,6 +10,7 @@ import numpy as np
 from ..geometry.pose import Array
 
 if TYPE_CHECKING:
+    from ..contact import StableCentres, StableRegion
     from ..problem import Scene
 
 
@@ -36,6 +37,8 @@ class PushSketch:
         refusal: why the push cannot steer; empty if it can.
         centres: rotation centres between the edges of the cone, in order, shape (n, 2): the curve that stands
             for the line under a general surface; empty for a line.
+        region: two fingers with their composite cone: all rotation centres that keep both contacts, about the COF.
+        any_pressure: the part of them that does so whatever the pressure on the table, after Lynch and Mason.
     """
 
     name: str
@@ -55,6 +58,8 @@ class PushSketch:
     straight: Array
     refusal: str = ""
     centres: Array = field(default_factory=lambda: np.empty((0, 2)))
+    region: "StableCentres | None" = None
+    any_pressure: "StableRegion | None" = None
 
     @property
     def steers(self) -> bool:

@@ -100,6 +100,11 @@ def _centres_box(scene: Scene, sketch: PushSketch) -> Box:
         if _near(place, sketch, size):
             # Beyond a centre there must be room to see where its ray goes.
             shown.append((cof + 1.15 * (place - cof))[None])
+    if sketch.region is not None:
+        # Room for the centres that are far away, where the darker regions are.
+        along = (sketch.left_centre - sketch.right_centre) * 2.2 * size
+        along /= max(float(np.linalg.norm(sketch.left_centre - sketch.right_centre)), 1e-300)
+        shown.append(cof + np.stack([along, -along]))
     return _box(shown, 0.14 * size)
 
 
@@ -159,7 +164,9 @@ def _rotation_centres(axes: Any, sketch: PushSketch, pointers: bool) -> None:
     reach = 4 * float(np.ptp(axes.get_xlim()) + np.ptp(axes.get_ylim())) + float(np.linalg.norm(left - right))
     line = np.stack([left + reach * along, right - reach * along])
     axes.plot(*line.T, color="#888888", linewidth=0.8, linestyle=(0, (4, 2.5)), zorder=2)
-    if len(sketch.centres):
+    if sketch.region is not None:
+        _regions(axes, sketch)
+    elif len(sketch.centres):
         turning = _sense(sketch)
         for sense, colour in ((1, palette.COUNTER_CLOCKWISE), (-1, palette.CLOCKWISE)):
             curve = np.where((turning == sense)[:, None], MM * sketch.centres, np.nan)
@@ -179,6 +186,37 @@ def _rotation_centres(axes: Any, sketch: PushSketch, pointers: bool) -> None:
     axes.plot(
         *(MM * sketch.flat_point), "o", color=palette.FLAT, mec="white", mew=0.8, markersize=8, zorder=9
     )
+
+
+def _regions(axes: Any, sketch: PushSketch) -> None:
+    """The centres that keep two contacts, light; those that do so under any pressure, dark."""
+    from matplotlib.patches import Polygon
+
+    assert sketch.region is not None
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    x, y = sketch.cof
+    box = (x0 / MM - x, y0 / MM - y, x1 / MM - x, y1 / MM - y)
+    for sense, colour in ((1, palette.COUNTER_CLOCKWISE), (-1, palette.CLOCKWISE)):
+        shown = [(sketch.region.polygon(sense, box), 0.16, 0.8)]
+        if sketch.any_pressure is not None:
+            shown.append((sketch.any_pressure.polygon(sense, box), 0.3, 0.0))
+        for corners, alpha, width in shown:
+            if len(corners) > 2:
+                axes.add_patch(
+                    Polygon(
+                        MM * (corners + sketch.cof), facecolor=colour, alpha=alpha, linewidth=0, zorder=1.5
+                    )
+                )
+                if width:
+                    axes.add_patch(
+                        Polygon(
+                            MM * (corners + sketch.cof),
+                            fill=False,
+                            edgecolor=colour,
+                            linewidth=width,
+                            zorder=1.6,
+                        )
+                    )
 
 
 def _sense(sketch: PushSketch) -> Array:
@@ -275,11 +313,16 @@ def _legend(figure: Any, sketches: tuple[PushSketch, ...]) -> None:
         Line2D([], [], color=INK, linewidth=0.8, linestyle=":", label="contact to COF"),
     ]
     if any(s.steers for s in sketches):
+        turns = (
+            (palette.COUNTER_CLOCKWISE, "centres of left turns (+, ccw)"),
+            (palette.CLOCKWISE, "centres of right turns (−, cw)"),
+        )
+        if any(s.region is not None for s in sketches):
+            entries += [Patch(facecolor=c + "38", edgecolor=c, label=label) for c, label in turns]
+            entries.append(Patch(facecolor="#00000055", label="darker: whatever the pressure on the table"))
+        else:
+            entries += [Line2D([], [], color=c, linewidth=2.2, label=label) for c, label in turns]
         entries += [
-            Line2D(
-                [], [], color=palette.COUNTER_CLOCKWISE, linewidth=2.2, label="centres of left turns (+, ccw)"
-            ),
-            Line2D([], [], color=palette.CLOCKWISE, linewidth=2.2, label="centres of right turns (−, cw)"),
             Line2D(
                 [],
                 [],

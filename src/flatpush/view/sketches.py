@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..contact import Placement, StableCentres, StableRegion, stable_region
 from ..friction import Ellipsoid
 from ..geometry import rotate
 from ..geometry.pose import Array
 from ..planning import PushDescription
 from ..problem import Scene
-from ..problem.mechanics import surface_of, virtual_contact
+from ..problem.mechanics import contacts_of, slider_of, surface_of, virtual_contact
 from ..steering.car import Car
 from .describe import PushSketch
 
@@ -32,6 +33,7 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
     motion, force = contact.motion_cone(surface), contact.force_edges()
     nothing = np.full(2, np.nan)
     car = option.car
+    two = car is not None and car.cone is not None
     return PushSketch(
         name=option.push.name,
         contact_points=placement.points,
@@ -49,8 +51,15 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
         flat_point=nothing if car is None else car.flat_point,
         straight=nothing if car is None else car.direction,
         refusal=option.refusal,
-        centres=np.empty((0, 2)) if car is None or isinstance(surface, Ellipsoid) else _centres(car),
+        centres=np.empty((0, 2)) if car is None or two or isinstance(surface, Ellipsoid) else _centres(car),
+        region=StableCentres.of(car.cone, surface) if car is not None and car.cone is not None else None,
+        any_pressure=_any_pressure(scene, placement) if two else None,
     )
+
+
+def _any_pressure(scene: Scene, placement: Placement) -> StableRegion:
+    slider = slider_of(scene.object)
+    return stable_region(contacts_of(scene, placement), slider, float(np.max(np.linalg.norm(slider, axis=1))))
 
 
 def _centres(car: Car) -> Array:

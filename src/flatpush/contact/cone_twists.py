@@ -1,0 +1,156 @@
+"""The three motions of a two-finger push that turn an object tightest within the fingers' true composite cone."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ..errors import NoDubinsReduction
+from ..friction.surface import LimitSurface
+from ..geometry import cross, perpendicular
+from ..geometry.pose import Array
+from .point_contact import PointContact
+from .straight import PAST_EDGE, straight_force
+from .wrench_cone import CLOSED, WrenchCone, narrowed, straight_wrenches
+
+Cost = Literal["flat", "pusher", "time"]
+# Wrenches between two edges of the narrowed cone that are tried beside the edges.
+ON_FACE = 1
+# Choices that differ by less than this part are equal; the first is taken, so that rounding does not decide.
+EQUAL = 1e-7
+
+
+def cone_twists(
+    contacts: Sequence[PointContact],
+    surface: LimitSurface,
+    margin: float,
+    hand: Array,
+    cost: Cost = "flat",
+    *,
+    quick: bool = False,
+) -> Array:
+    """Left turn, straight motion and right turn of a two-finger push, as twists about the COF, shape (3, 3).
+
+    The turns have ω = 1 and ω = -1, the straight motion has unit speed. Each has a wrench in the composite cone less
+    the margin (see wrench_cone.narrowed). The turning centres are chosen among those that the edges and faces of
+    the narrowed cone make: closest together for the cost "flat", closest to the hand for "pusher", to its farther
+    finger for "time".
+
+    The straight motion is square to the line of the centres: then it is a sum of the two turns, and the push is a
+    Dubins car whatever the limit surface. Where the narrowed cone does not reach that far, it is the nearest direction
+    that it reaches.
+
+    Args:
+        contacts: the two, about the COF.
+        margin: friction margin, in [0, 1).
+        hand: the places whose paths count, about the COF, shape (k, 2): the middle of the hand, or its fingertips.
+        quick: only the edges of the narrowed cone are tried, where the best centres nearly always are.
+
+    Raises:
+        NoDubinsReduction: if every force of the fingers turns the object the same way, or, less the margin, does.
+        InputError: if the fingers squeeze the object, or have no friction.
+    """
+    cone = WrenchCone.of(contacts)
+    inner = narrowed(contacts, margin, _straight(contacts, cone, surface)[:2])
+    pair = straight_wrenches(inner, surface)
+    if pair is None:
+        raise NoDubinsReduction(_beside(inner, f" with the friction margin {margin:g}; take less of it"))
+    towards = np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
+    lefts, rights = _turns(cone, inner, surface, towards, 0 if quick else ON_FACE)
+    left, right = _tightest(lefts, rights, hand, cost)
+    straight = _between(inner, surface, left, right, pair)
+    a, b = _centres(np.stack([left, right]))
+    if cross(straight[:2], a - b) <= 0:
+        raise NoDubinsReduction("the turning centres of this push do not lie on either side of its way")
+    return np.stack([left, straight, right])
+
+
+def _straight(contacts: Sequence[PointContact], cone: WrenchCone, surface: LimitSurface) -> Array:
+    """A wrench inside the cone that pushes straight: at the middle contact if that is inside, else in the middle."""
+    pair = straight_wrenches(cone, surface)
+    if pair is None:
+        raise NoDubinsReduction(
+            _beside(
+                cone, ". A place nearer to the line of the normal through the centre of friction would help"
+            )
+        )
+    middle = PointContact(
+        np.mean([c.point for c in contacts], axis=0),
+        np.mean([c.normal for c in contacts], axis=0),
+        contacts[0].friction,
+        hook=True,
+    )
+    try:
+        F = middle.wrench(straight_force(middle, surface))
+    except NoDubinsReduction:
+        return np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
+    return F if cone.depth(F) > 0 else np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
+
+
+def _beside(cone: WrenchCone, rest: str) -> str:
+    """Why a cone cannot steer: which way all its forces turn the object, and how near to the COF they come."""
+    wrenches = cone.wrenches
+    levers = wrenches[:, 2] / np.linalg.norm(wrenches[:, :2], axis=1)
+    way = "counter-clockwise" if levers[0] > 0 else "clockwise"
+    least = 1000 * float(np.min(np.abs(levers)))
+    return (
+        f"every force that the two fingers have together turns the object {way}: the nearest one's line passes the"
+        f" centre of friction at {least:.1f} mm, so the push cannot go straight{rest}"
+    )
+
+
+def _turns(
+    cone: WrenchCone, inner: WrenchCone, surface: LimitSurface, towards: Array, between: int
+) -> tuple[Array, Array]:
+    """Twists of wrenches on the narrowed cone, left turns (ω = 1) and right turns (ω = -1).
+
+    A wrench on a facet shares its twist, a rotation about a support point, with all others there. It is moved towards
+    the straight one until all of them lie in the whole cone, or until it is off the facet.
+    """
+    rays = inner.wrenches[inner.order()]
+    rays = rays / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
+    nexts = np.roll(rays, -1, axis=0)
+    parts = np.arange(between + 1) / (between + 1)
+    found: tuple[list[Array], list[Array]] = ([], [])
+    for F in np.concatenate([(1 - s) * rays + s * nexts for s in parts]):
+        way, step = 0.0, PAST_EDGE
+        while way < 1:
+            V = surface.twist((1 - way) * F + way * towards)
+            if V[2] == 0 or cone.depths(surface.wrench_set(V))[0] >= -CLOSED:
+                break
+            way, step = way + step, 1.5 * step
+        if way < 1 and V[2] != 0:
+            found[0 if V[2] > 0 else 1].append(V / abs(V[2]))
+    if not found[0] or not found[1]:
+        raise NoDubinsReduction("the two fingers cannot turn the object both ways and keep it")
+    return np.array(found[0]), np.array(found[1])
+
+
+def _tightest(lefts: Array, rights: Array, hand: Array, cost: Cost) -> tuple[Array, Array]:
+    """The pair of turns that the cost likes best."""
+    a, b = _centres(lefts), _centres(rights)
+    if cost == "flat":
+        apart = np.linalg.norm(a[:, None] - b[None], axis=2)
+    else:
+        to_left, to_right = (np.max(np.linalg.norm(c[:, None] - hand[None], axis=2), axis=1) for c in (a, b))
+        apart = to_left[:, None] + to_right[None]
+    best = int(np.flatnonzero(apart.ravel() <= np.min(apart) * (1 + EQUAL))[0])
+    return lefts[best // len(rights)], rights[best % len(rights)]
+
+
+def _between(
+    inner: WrenchCone, surface: LimitSurface, left: Array, right: Array, pair: tuple[Array, Array]
+) -> Array:
+    """The straight motion: the sum of the turns, or the nearest that the narrowed cone reaches."""
+    V = np.array([*(left + right)[:2], 0.0])
+    V = V / np.hypot(V[0], V[1])
+    if inner.depth(surface.wrench(V)) >= -CLOSED:
+        return V
+    ends = [surface.twist(F)[:2] for F in pair]
+    ends = [end / np.hypot(*end) for end in ends]
+    v = max(ends, key=lambda end: float(end @ V[:2]))
+    return np.array([*v, 0.0])
+
+
+def _centres(twists: Array) -> Array:
+    return np.asarray(perpendicular(twists[:, :2]) / twists[:, 2:])
