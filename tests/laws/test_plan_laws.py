@@ -152,7 +152,11 @@ def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
         workspace = fp.Workspace(bounds, tuple(np.array(o) for o in obstacles))
         return fp.plan(
             fp.Scene(
-                triangle, start, pusher=pusher, workspace=workspace, planning=fp.Planning(clearance=clearance)
+                triangle,
+                start,
+                pusher=pusher,
+                workspace=workspace,
+                planning=fp.Planning(clearance=clearance, iterations=500, time_limit=60),
             )
         )
 
@@ -166,9 +170,10 @@ def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
     assert kept.certificate.clearance == pytest.approx(min(gaps), abs=1e-4)
     assert fp.verify(kept).ok
     across = [(-0.1, -0.06), (0.1, -0.06), (0.1, -0.055), (-0.1, -0.055)]
-    blocked = planned(obstacles=[across])
-    assert blocked.status == "no_plan"
-    assert "clearance" in blocked.reason
+    around = planned(obstacles=[across])
+    assert around.certificate.clearance >= 0
+    assert around.cost > kept.cost
+    assert fp.verify(around).ok
     assert planned(obstacles=[beside], clearance=0.04).certificate.get("clearance", 1.0) >= 0.04
     assert planned(bounds=(-0.08, -0.14, 0.08, 0.08)).status == "solved"
     assert planned(bounds=(-0.035, -0.14, 0.06, 0.06)).status == "no_plan"
@@ -180,7 +185,13 @@ def test_clearance_sees_a_needle_between_samples(triangle):
     pusher = fp.Pusher(fingers=2, spacing=0.018)
     for x in np.linspace(-0.03, 0.015, 4):
         needle = np.array([(x, -0.0901), (x + 1e-6, -0.0901), (x, -0.0899)])
-        scene = fp.Scene(triangle, start, pusher=pusher, workspace=fp.Workspace(None, (needle,)))
+        scene = fp.Scene(
+            triangle,
+            start,
+            pusher=pusher,
+            workspace=fp.Workspace(None, (needle,)),
+            planning=fp.Planning(iterations=300, time_limit=60),
+        )
         plan = fp.plan(scene)
         if plan.status == "solved":
             from shapely import Polygon

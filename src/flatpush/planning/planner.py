@@ -1,7 +1,7 @@
 """Plans of one or many pushes for one object and goal, from any start."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -14,8 +14,10 @@ from ..errors import FlatpushError
 from ..geometry import pose_error
 from ..geometry.pose import Array
 from ..problem import Certificate, Plan, Scene
-from ..simulation import certify, clearance_of
+from ..simulation import certify
 from ..steering.fleet import Fleet
+from .answer import Answer
+from .around import Around, Progress
 from .assembly import Leg, Segments, assemble, car_of, costs, words_of
 from .candidates import automatic_pushes
 from .fleets import fleet_of
@@ -39,11 +41,14 @@ class Planner:
         scene: its start is the default start of plan().
         tree: whether a search tree towards the goal is built to start the search from (kept in a cache keyed by
             content), or the file to keep it in: read if it exists, else written. For one start it does not pay.
+        progress: called among obstacles after every round of the search, some hundredths of a second, with the cost
+            so far (infinite: none), the seconds since it began and the number of poses in its trees.
 
     Attributes:
         scene: with its pushes listed.
         options: the pushes as cars, or why they are none; left_out: automatic candidates that were dropped.
         freedom: whether the pushes move the object "free"-ly, by "detours", or not ("none").
+        explored: after a search among obstacles, paths of the COF along edges of its tree, shape (m, k, 2) [m].
 
     >>> import flatpush as fp
     >>> thing = fp.Object([(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)], "outline")
@@ -52,7 +57,9 @@ class Planner:
     [True, True]
     """
 
-    def __init__(self, scene: Scene, tree: bool | str | Path = True) -> None:
+    def __init__(
+        self, scene: Scene, tree: bool | str | Path = True, progress: Progress | None = None
+    ) -> None:
         self.left_out: tuple[PushOption, ...] = ()
         if scene.pushes == "auto":
             pushes, self.left_out = automatic_pushes(scene)
@@ -61,6 +68,8 @@ class Planner:
         self.options = () if scene.pushes == "auto" else push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
         self._tree = tree
+        self._progress = progress
+        self._around: Around | None = None
 
     @property
     def freedom(self) -> Freedom:
@@ -74,11 +83,10 @@ class Planner:
     def plan(self, start: ArrayLike | None = None) -> Plan:
         """The best plan found from a start pose X_WO (3,), by default the scene's.
 
-        A start within the goal tolerance is a solved plan without a push. The plan keeps bounds and obstacles, or
-        there is none: the ways found are checked in the order of their cost, but none is sought around obstacles.
+        A start within the goal tolerance is a solved plan without a push. The plan keeps bounds and obstacles.
         """
-        *_, best = self._answers(start)
-        return best()
+        *_, best = self.answers(start)
+        return best.plan()
 
     def plans(self, starts: Iterable[ArrayLike]) -> list[Plan]:
         """A plan from each start."""
@@ -86,48 +94,56 @@ class Planner:
 
     def improving(self, start: ArrayLike | None = None) -> Iterator[Plan]:
         """Plans that get better, the first one at once; plan() is the last of them."""
-        for answer in self._answers(start):
-            yield answer()
+        for answer in self.answers(start):
+            yield answer.plan()
 
-    def _answers(self, start: ArrayLike | None) -> Iterator[Callable[[], Plan]]:
-        """Better and better answers; each is certified only when it is called for."""
+    def answers(self, start: ArrayLike | None = None) -> Iterator[Answer]:
+        """Better and better answers, each as soon as it is found and certified only when its plan is called for.
+
+        There is always one; where there is no plan, its cost is infinite. The search may be left at any answer.
+        """
         began = time.perf_counter()
         scene = self.scene if start is None else replace(self.scene, start=start)
         if np.all(np.abs(pose_error(scene.start, scene.goal)) <= scene.planning.goal_tolerance):
-            yield partial(_solved, scene, (), began, {})
+            yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return
         if not self.usable:
-            yield partial(_none, scene, f"no push can steer the object. {_listed(self.reasons)}", began)
+            reason = f"no push can steer the object. {_listed(self.reasons)}"
+            yield Answer(np.inf, partial(_none, scene, reason, began))
             return
         best = np.inf
-        reasons, tightest, count = self.reasons, -np.inf, 0
-        for expected, legs, found in self._candidates(scene):
-            if expected >= best * (1 - 1e-12):
-                continue
-            count += 1
-            try:
-                segments = assemble(scene, self.transits, legs)
-            except FlatpushError as error:
-                reasons.setdefault(legs[0].option.push.name, str(error))
-                continue
-            clearance = clearance_of(scene, segments, scene.planning.clearance)
-            if clearance is not None and clearance < scene.planning.clearance:
-                tightest = max(tightest, clearance)
-                continue
-            best = expected
-            yield partial(_solved, scene, segments, began, found)
+        reasons, blocked = self.reasons, ""
+        if _crowded(scene):
+            self._around = Around(scene, self.usable, self.fleet, self.transits, self._progress)
+            for cost, segments, found in self._around.answers(partial(self._unhindered, scene)):
+                best = cost
+                yield Answer(cost, partial(_solved, scene, segments, began, found), found)
+            blocked = self._around.tried
+        else:
+            for cost, legs, found in self._candidates(scene):
+                if cost >= best * (1 - 1e-12):
+                    continue
+                try:
+                    segments = assemble(scene, self.transits, legs)
+                except FlatpushError as error:
+                    reasons.setdefault(legs[0].option.push.name, str(error))
+                    continue
+                best = cost
+                yield Answer(cost, partial(_solved, scene, segments, began, found), found)
         if np.isinf(best):
-            blocked = ""
-            if np.isfinite(tightest):
-                blocked = (
-                    f"each of the {count} ways that were tried comes too near to an obstacle or the bounds: the best"
-                    f" has {1000 * tightest:.2f} mm of clearance, {1000 * scene.planning.clearance:.2f} mm are asked"
-                    " for. "
-                )
-            yield partial(_none, scene, blocked + _listed(reasons), began)
+            yield Answer(np.inf, partial(_none, scene, blocked + _listed(reasons), began))
+
+    @property
+    def explored(self) -> Array | None:
+        return None if self._around is None else self._around.explored
+
+    def _unhindered(self, scene: Scene) -> Iterator[Sequence[Leg]]:
+        """What the search without obstacles finds: where it is clear of them there is nothing better."""
+        for _, legs, _ in self._searched(scene, np.inf):
+            yield legs
 
     def _candidates(self, scene: Scene) -> Iterator[tuple[float, Sequence[Leg], dict[str, Any]]]:
-        """Ways with their costs: all words of single pushes, cheapest first, then what the search finds."""
+        """Ways with their costs: the cheapest single push, then what the search finds; all single ones if it is one."""
         singles = sorted(
             (
                 (cost, i, k)
@@ -136,7 +152,7 @@ class Planner:
             ),
         )
         several = len(self.usable) > 1
-        for cost, i, k in singles[:1] if several and not _crowded(scene) else singles:
+        for cost, i, k in singles[:1] if several else singles:
             word = words_of(scene, self.usable[i])[k]
             leg = Leg(self.usable[i], word.word, word.parameters, scene.goal_pose)
             yield cost, (leg,), {"single_cost": singles[0][0]}
@@ -148,15 +164,7 @@ class Planner:
         from .refine import improvements
 
         planning = scene.planning
-        # Among obstacles the ways of the tree are also alternatives where better ones are blocked.
-        seeds = query(self.tree, scene.start_pose, SEEDS) if self._tree or _crowded(scene) else []
-        if _crowded(scene) and not planning.robust:
-            for way in seeds:
-                yield (
-                    way.cost,
-                    self._legs(way.pushes, way.poses),
-                    {"graph_cost": seeds[0].cost, "single_cost": single},
-                )
+        seeds = query(self.tree, scene.start_pose, SEEDS) if self._tree else []
         search = improvements(
             self.fleet,
             scene.start_pose,
@@ -204,17 +212,6 @@ class Planner:
         poses = pose_samples(SAMPLES, scene.goal_pose, region, scene.planning.seed)
         file = None if isinstance(self._tree, bool) else self._tree
         return stored_tree(self.fleet, poses, scene.goal_pose, file)
-
-    def _legs(self, pushes: Sequence[int], poses: Array) -> list[Leg]:
-        """Legs between given poses, each with its cheapest word."""
-        legs = []
-        for a, start, goal in zip(pushes, poses[:-1], poses[1:], strict=True):
-            option = self.usable[int(a)]
-            part = replace(self.scene, start=start, goal=goal)
-            k = int(np.argmin(costs(part, option)))
-            word = words_of(part, option)[k]
-            legs.append(Leg(option, word.word, word.parameters, np.asarray(goal)))
-        return legs
 
     @cached_property
     def transits(self) -> Transits:

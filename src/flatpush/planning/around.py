@@ -1,0 +1,205 @@
+"""Answers of the search among obstacles: each way is made a plan, checked as a whole, and only then given."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlatpushError
+from ..geometry import Outline, compose, exp, transform
+from ..geometry.collision import Body, World
+from ..geometry.pose import Array
+from ..problem import PushSegment, Scene, TransitSegment
+from ..steering.fleet import Fleet
+from .assembly import Leg, Segments, assemble
+from .obstacles import Search, Way, careful, legs_of, obstructions, task_of, way_of
+from .options import PushOption
+from .segments import SAG
+from .transits import Transits
+
+# The search stops after this many expansions of poses or tries at a better path for each of the scene's iterations.
+WORK = 30
+BETTER = 0.003  # the part of its cost by which a way is better before it is worth checking
+FAR = 1.0  # clearances beyond it are not told apart [m]
+SAMPLES = 7  # points of an edge that is drawn
+Progress = Callable[[float, float, int], object]
+
+
+class Around:
+    """One question among obstacles.
+
+    Attributes:
+        search: the search, for what it has seen.
+        tried: what was tried so far, in words.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        options: Sequence[PushOption],
+        fleet: Fleet,
+        transits: Transits,
+        progress: Progress | None,
+    ) -> None:
+        self.scene, self.options, self.transits, self.progress = scene, options, transits, progress
+        self.task = task_of(scene, options, fleet)
+        self.search = Search(self.task, scene.planning.seed)
+        self.best, self.refused = np.inf, 0
+        self.complaint = ""
+        self._first: float | None = None
+
+    def answers(
+        self, unhindered: Callable[[], Iterator[Sequence[Leg]]]
+    ) -> Iterator[tuple[float, Segments, dict[str, Any]]]:
+        """Cost, segments and what to tell of better and better plans; ends with the limits of the scene.
+
+        Args:
+            unhindered: finds ways as if there were nothing in the way; asked where it may be so.
+        """
+        self.complaint = obstructions(self.scene, self.task, self.options)
+        if self.complaint:
+            return
+        self.search.prepare()
+        began = time.perf_counter()
+        searched = self._rounds(began, self.search, unhindered)
+        for way in searched:
+            found = self._checked(way, began)
+            if found is not None:
+                yield found
+            elif self.search.task is self.task:
+                # The hand did not find its way at a change of push: from now on changes have room to spare.
+                self.search = Search(careful(self.scene, self.task), self.scene.planning.seed)
+                break
+        else:
+            return
+        for way in self._rounds(began, self.search, unhindered):
+            found = self._checked(way, began)
+            if found is not None:
+                yield found
+
+    def _rounds(
+        self, began: float, search: Search, unhindered: Callable[[], Iterator[Sequence[Leg]]]
+    ) -> Iterator[Way]:
+        """Ways that are worth checking."""
+        planning = self.scene.planning
+        asked, fresh = np.inf, True
+        for way in search.rounds():
+            clock = time.perf_counter() - began
+            if self.progress is not None:
+                self.progress(self.best, clock, search.nodes)
+            done = search.work >= WORK * planning.iterations or clock > planning.time_limit
+            worth = min(asked, self.best) * (1.0 if done else 1 - BETTER)
+            if way is not None and way.cost < worth:
+                asked = way.cost
+                yield way
+            if done:
+                return
+            if fresh and way is not None and search.direct:
+                fresh = False
+                if self._free(search, unhindered):
+                    if search.best is not None and search.cost < min(asked, self.best):
+                        yield search.best
+                    return
+
+    def _free(self, search: Search, unhindered: Callable[[], Iterator[Sequence[Leg]]]) -> bool:
+        """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
+        clear = False
+        for done, legs in enumerate(unhindered()):
+            clear = search.offer(way_of(legs, self.options, self.task))
+            if done > 0 and not clear:
+                return False
+        return clear
+
+    def _checked(self, way: Way, began: float) -> tuple[float, Segments, dict[str, Any]] | None:
+        """The plan of a way, if it is one as a whole, with the pusher's transits."""
+        scene, need = self.scene, self.scene.planning.clearance
+        try:
+            segments = assemble(scene, self.transits, legs_of(way, self.options))
+        except FlatpushError as error:
+            self.refused += 1
+            self.complaint = f"{error}. "
+            return None
+        room = hand_clearance(scene, self.task.world, segments)
+        if room < need:
+            self.refused += 1
+            self.complaint = (
+                f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm). "
+            )
+            return None
+        self.best = way.cost
+        if self._first is None:
+            self._first = time.perf_counter() - began
+        return way.cost, segments, {"first_path_time": self._first, "poses_searched": self.search.nodes}
+
+    @property
+    def tried(self) -> str:
+        """What was tried, for a scene without a plan."""
+        search = self.search
+        if self.complaint and not search.nodes:
+            return self.complaint
+        if search.closed:
+            return (
+                f"even a disc of {1000 * search.disc:.1f} mm radius, the largest inside the object, has no way from"
+                " the start to the goal that keeps the clearance. "
+            )
+        refused = f"{self.refused} ways were refused: {self.complaint}" if self.refused else ""
+        return (
+            f"{search.nodes} poses were searched from the start and from the goal with"
+            f" {self.task.fleet.size} pushes, in cells down to {1000 * search.finest:.1f} mm, and none of the ways"
+            f" reached the other end with {1000 * self.scene.planning.clearance:.2f} mm of clearance. {refused}"
+            "More time (time_limit, iterations), less clearance or other pushes may help. "
+        )
+
+    @property
+    def explored(self) -> Array:
+        """Paths of the COF along edges of the search tree, shape (m, SAMPLES, 2) [m]."""
+        steps, starts = self.search.edges()
+        shares = np.linspace(0.0, 1.0, SAMPLES)
+        poses = compose(starts[:, None], exp(shares[None, :, None] * steps[:, None]))
+        return transform(poses, self.scene.object.cof)
+
+
+def hand_clearance(scene: Scene, world: World, segments: Segments) -> float:
+    """The least clearance of the fingertips while they do not push, from the bounds and, on the table, obstacles [m].
+
+    A lower bound: along the chords between samples, less what a turning hand may bow out from them. The object rests
+    meanwhile, and its own clearance belongs to the pushes.
+    """
+    from ..geometry.collision.kernels import line_gap, pose_gap
+
+    radius, bounds = scene.pusher.tip_radius, world.bounds
+    tip = Body.of(Outline.circle(max(radius, 1e-9)))
+    best = np.inf
+    for i, segment in enumerate(segments):
+        if not isinstance(segment, TransitSegment):
+            continue
+        push = next(s for s in (*segments[i + 1 :], *segments[i - 1 :: -1]) if isinstance(s, PushSegment))
+        turned = np.diff(segment.pusher[:, 2]) != 0.0
+        bow = 2 * SAG if np.any(turned) else 0.0
+        for finger in push.fingers:
+            points = transform(segment.pusher, finger)
+            inside = min(np.min(points - bounds[:2]), np.min(bounds[2:] - points)) - radius
+            best = min(best, float(inside) - bow)
+            for k, m in _stretches(points, segment.height):
+                (x, y), (dx, dy) = points[k], points[m] - points[k]
+                gap = pose_gap(world.arrays, *tip.arrays, np.array([x, y, 0.0]), FAR, -np.inf)
+                if np.hypot(dx, dy) > 0:
+                    gap = min(gap, line_gap(world.arrays, *tip.arrays, x, y, 1.0, 0.0, dx, dy, FAR, -np.inf))
+                best = min(best, float(gap) - bow)
+    return best
+
+
+def _stretches(points: Array, heights: Array) -> list[tuple[int, int]]:
+    """First and last sample of the straight stretches on the table."""
+    found: list[tuple[int, int]] = []
+    for k in range(len(points) - 1):
+        if heights[k] > 0 or heights[k + 1] > 0:
+            continue
+        if found and found[-1][1] == k:
+            a, b = points[k] - points[found[-1][0]], points[k + 1] - points[k]
+            if abs(a[0] * b[1] - a[1] * b[0]) <= 1e-12 * np.hypot(*a) and a @ b >= 0:
+                found[-1] = (found[-1][0], k + 1)
+                continue
+        found.append((k, k + 1))
+    return found
