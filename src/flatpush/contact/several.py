@@ -189,6 +189,8 @@ def _sliding(
     a, b = (float(c.normal @ v) for c, v in zip(contacts, u, strict=True))
     for left in ((x, y) for x in (True, False) for y in (True, False)):
         first, second = (_edge(c, side) for c, side in zip(contacts, left, strict=True))
+        if not _may_slide(contacts, surface, u, left, np.array([a, b])):
+            continue
 
         def twist(share: float, first: Array = first, second: Array = second) -> tuple[Array, float, float]:
             V = surface.twist((1 - share) * first + share * second)
@@ -225,3 +227,31 @@ def _sliding(
                 (s > 0) == side or c.friction == 0 for c, s, side in zip(contacts, slips, left, strict=True)
             ):
                 yield V
+
+
+def _may_slide(
+    contacts: Sequence[PointContact], surface: LimitSurface, u: Array, left: tuple[bool, bool], closing: Array
+) -> bool:
+    """Whether a wrench may cross the plane of two sliding forces: a cheap look, since most pairs do not slide.
+
+    The twists that keep both normal velocities are V₀ + ω k; those of them that slide to the sides given lie between
+    or beyond the two ω at which a slip vanishes.
+    """
+    rows = np.concatenate([_rows(c, False) for c in contacts])
+    V0, k = np.linalg.lstsq(rows, closing, rcond=1e-12)[0], np.cross(rows[0], rows[1])
+    if not np.any(k):
+        return True
+    k = k / np.linalg.norm(k)
+    slips = np.array([[_slip(c, V0, v), _slip(c, k, 0 * v)] for c, v in zip(contacts, u, strict=True)])
+    turning = np.abs(slips[:, 1]) > 1e-12
+    zeros = np.sort(-slips[turning, 0] / slips[turning, 1]) if np.any(turning) else np.zeros(1)
+    span = max(float(zeros[-1] - zeros[0]), 1e-9)
+    away = span * np.logspace(-6, 9, 61)
+    inner = zeros[0] + span * (0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 41)))
+    w = np.concatenate([zeros[0] - away[::-1], inner, zeros[-1] + away])
+    middle = 0.5 * (w[1:] + w[:-1])
+    slide = slips[:, :1] + slips[:, 1:] * middle
+    there = np.all((slide > 0) == np.array(left)[:, None], axis=0)
+    first, second = (_edge(c, side) for c, side in zip(contacts, left, strict=True))
+    off = surface.wrench(V0 + w[:, None] * k) @ np.cross(first, second)
+    return bool(np.any(there & (off[1:] * off[:-1] <= 0)))

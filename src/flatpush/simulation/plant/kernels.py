@@ -23,6 +23,7 @@ TOUCH = 2e-8  # a gap up to this, by the outline's size, touches
 OVERLAP = 1e-5  # a deeper overlap at the start, by the outline's size, is inside
 _LOOKS = 8  # places on a step at which fingers that do not touch are watched
 _HALVINGS = 5
+_SETTLES = 4  # times that a step is shortened to where something touches
 
 
 @part
@@ -392,7 +393,7 @@ def advance(
                 stretch = min(stretch, max(0.25 * radius, 2e-4 * size))
         h = (1 - s) / max(1.0, math.ceil((1 - s) * travel / stretch - 1e-9))
         shortest = h / (1 << _HALVINGS)
-        settled = False
+        settled = 0
         e0, e1 = m0, m1
         da = db = dw = 0.0
         for _ in range(60):
@@ -425,7 +426,7 @@ def advance(
                     da, db, dw = 6 * a, 6 * b, 6 * w
                     e0, e1 = m0, m1
                 da, db, dw = da / 6, db / 6, dw / 6
-            if settled:
+            if settled == _SETTLES:
                 break
             # Fingers that do not touch yet.
             before, hit = 0.0, -1.0
@@ -453,7 +454,7 @@ def advance(
                     if gap <= 0.5 * TOUCH * size:
                         break
             h = max(before, 1e-9) * h
-            settled = True
+            settled += 1  # and again, since the shorter step moves the object a little otherwise
         x, y, t = displaced(qx, qy, qt, da, db, dw, h)
         object_[0], object_[1], object_[2] = x, y, t
         s = 1.0 if s + h > 1 - 1e-12 else s + h

@@ -9,26 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...contact import ContactMode
 from ...errors import InputError
 from ...friction.surface import LimitSurface
 from ...geometry.pose import Array
 from ...problem import Object
 from ...problem.mechanics import surface_of
 from ...problem.scene import Model
+from . import runs
+from .plain import Fingers
+from .runs import MODES, OUTCOMES
 from .table import outline_table, surface_table
 
-MODES = tuple(
-    mode.value
-    for mode in (
-        ContactMode.REST,
-        ContactMode.STICKING,
-        ContactMode.SLIDING_LEFT,
-        ContactMode.SLIDING_RIGHT,
-        ContactMode.SEPARATION,
-    )
-)
-OUTCOMES = ("", "jammed", "grasped", "starts inside", "too many contacts", "undecided")
+_MANY, _UNDECIDED = OUTCOMES.index("too many contacts"), OUTCOMES.index("undecided")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +89,15 @@ class Plant:
 
     Args:
         thing: the object.
-        fingers: fingertip centres in E, shape (k, 2), k ≤ 2 [m].
+        fingers: fingertip centres in E, shape (k, 2), any number [m]. One and two are compiled, and anything that these
+            cannot decide (three contacts in a hollow) goes the plain way, as do three and more: far slower.
         tip_radius: [m].
         model: limit surface (see problem.mechanics.surface_of; "local": about a push along +x of the hand is not known
             here, give it as surface).
         surface: a limit surface about the centre of friction, instead of the model's.
         friction: between fingertip and object, instead of the object's.
         cof: the centre of friction in O (2,), instead of the support's centre.
+        plain: goes the plain way for one and two fingers as well.
 
     Raises:
         InputError: for fingers or numbers that make no sense.
@@ -126,10 +120,11 @@ class Plant:
         surface: LimitSurface | None = None,
         friction: float | None = None,
         cof: ArrayLike | None = None,
+        plain: bool = False,
     ) -> None:
         tips = np.ascontiguousarray(np.array(fingers, dtype=float))
-        if tips.ndim != 2 or tips.shape[1] != 2 or not 1 <= len(tips) <= 2 or not np.isfinite(tips).all():
-            raise InputError("fingers are one or two points [x, y] in the pusher's frame", value=fingers)
+        if tips.ndim != 2 or tips.shape[1] != 2 or not len(tips) or not np.isfinite(tips).all():
+            raise InputError("fingers are one or more points [x, y] in the pusher's frame", value=fingers)
         if not (np.isfinite(tip_radius) and tip_radius >= 0):
             raise InputError("a tip radius is a finite number, 0 or more", value=tip_radius)
         mu = thing.friction if friction is None else float(friction)
@@ -141,6 +136,7 @@ class Plant:
         self.surface = surface if surface is not None else surface_of(thing, model, np.array([1.0, 0.0]))
         self.fingers, self.tip_radius = tips, float(tip_radius)
         self.cof = _vector(thing.cof if cof is None else cof, 2, "a centre of friction")
+        self._plain = plain or len(tips) > 2
         kind, table = surface_table(self.surface)
         #: (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels.
         self.pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
@@ -151,12 +147,9 @@ class Plant:
         Where fingers overlap the object it is moved out the shortest way, or, without push_out, the state's outcome is
         "starts inside".
         """
-        from .kernels import push_out as out
-
         q, hands = _vector(object_, 3, "a pose").copy(), self._hands(hand)
-        _, _, cof, shape, _, radius, fingers = self.pack
         if push_out:
-            out(shape, cof, radius, fingers, q, hands)
+            self._push_out(q, hands)
         return self._moved(q, hands, np.zeros_like(hands), np.ndim(hand) == 2)
 
     def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
@@ -183,16 +176,18 @@ class Plant:
             push_out: as in start.
             body: whether the hand goes from pose to pose with a constant body twist instead.
         """
-        from .kernels import follow as kernel
-        from .kernels import push_out as out
-
         q, hands = _vector(object_, 3, "a pose").copy(), self._way(hand)
-        _, _, cof, shape, _, radius, fingers = self.pack
         if push_out:
-            out(shape, cof, radius, fingers, q, hands[0])
+            self._push_out(q, hands[0])
         n, k = len(hands), len(self.fingers)
         poses, seen = np.empty((n, 3)), np.zeros((n, k, 5))
-        status, reached = kernel(*self.pack, q, hands, int(body), poses, seen)
+        status, reached = _MANY, 0
+        if not self._plain:
+            from .kernels import follow as kernel
+
+            status, reached = kernel(*self.pack, q.copy(), hands, int(body), poses, seen)
+        if status in (_MANY, _UNDECIDED):
+            status, reached = runs.follow(self._written(self.pack), q, hands, int(body), poses, seen)
         return PlantRun(
             poses, seen[:, :, 0].astype(np.int8), seen[:, :, 1:3], seen[:, :, 3], OUTCOMES[status], reached
         )
@@ -217,8 +212,6 @@ class Plant:
             threads: default: the machine's cores.
             push_out, body: as in follow. record: keeps the whole way of every run.
         """
-        from .kernels import many as kernel
-
         objects = np.array(starts, dtype=float)
         if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
             raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
@@ -254,13 +247,18 @@ class Plant:
         size = max(1, -(-n // (4 * workers)))
         args = (kind, tables, centres, shape, mus, radius, fingers, objects, hands, int(body), int(push_out))
 
-        def chunk(first: int) -> None:
-            kernel(first, min(first + size, n), *args, poses, seen, outcome)
+        begun = objects.copy()
+        if n and not self._plain:
+            from .kernels import many as kernel
 
-        if n:
+            def chunk(first: int) -> None:
+                kernel(first, min(first + size, n), *args, poses, seen, outcome)
+
             chunk(0)  # compiles, if need be, in one thread
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(chunk, range(size, n, size)))
+            with ThreadPoolExecutor(workers) as pool:
+                list(pool.map(chunk, range(size, n, size)))
+        for r in range(n) if self._plain else np.flatnonzero(np.isin(outcome, (_MANY, _UNDECIDED))):
+            self._again(int(r), begun[r], args, surfaces, push_out, poses, seen, outcome)
         bits = seen[..., 4].astype(int)
         stuck = ~np.any(bits & 0b1100, axis=(1, 2))
         way = (poses, seen[..., 0].astype(np.int8), seen[..., 1:3]) if record else (None, None, None)
@@ -281,11 +279,51 @@ class Plant:
             raise InputError("the poses of the hand are finite numbers")
         return np.ascontiguousarray(way)
 
-    def _moved(self, q: Array, hands: Array, step: Array, separate: bool) -> PlantState:
-        from .kernels import advance
+    def _push_out(self, q: Array, hands: Array) -> None:
+        if self._plain:
+            runs.push_out(self._written(self.pack), q, hands)
+        else:
+            from .kernels import push_out
 
-        seen = np.zeros((len(self.fingers), 5))
-        status = advance(*self.pack, q, hands, step, 0, seen)
+            _, _, cof, shape, _, radius, fingers = self.pack
+            push_out(shape, cof, radius, fingers, q, hands)
+
+    def _written(self, pack: tuple[Any, ...], surface: LimitSurface | None = None) -> Fingers:
+        """The plain version of what is packed."""
+        _, _, cof, _, mu, radius, fingers = pack
+        return Fingers(self.thing.outline, surface or self.surface, cof, mu, radius, fingers)
+
+    def _again(
+        self,
+        r: int,
+        q: Array,
+        args: tuple[Any, ...],
+        surfaces: Sequence[LimitSurface] | None,
+        push_out: bool,
+        poses: Array,
+        seen: Array,
+        outcome: Any,
+    ) -> None:
+        """Run r of many, plainly."""
+        kind, tables, cofs, shape, mus, radius, fingers, _, hands, body, _ = args
+        mine = (kind, tables, cofs[r % len(cofs)], shape, float(mus[r % len(mus)]), radius, fingers)
+        written = self._written(mine, None if surfaces is None else surfaces[r])
+        way = hands[r % len(hands)]
+        if push_out:
+            runs.push_out(written, q, way[0])
+        outcome[r], _ = runs.follow(written, q, way, body, poses[r], seen[r])
+
+    def _moved(self, q: Array, hands: Array, step: Array, separate: bool) -> PlantState:
+        seen, status = np.zeros((len(self.fingers), 5)), _MANY
+        if not self._plain:
+            from .kernels import advance
+
+            begun, held = q.copy(), hands.copy()
+            status = advance(*self.pack, q, hands, step, 0, seen)
+            if status in (_MANY, _UNDECIDED):
+                q, hands = begun, held
+        if status in (_MANY, _UNDECIDED):
+            status = runs.advance(self._written(self.pack), q, hands, step, 0, seen)
         modes = tuple(MODES[int(code)] for code in seen[:, 0])
         return PlantState(
             q, hands if separate else hands[0], modes, seen[:, 1:3], seen[:, 3], OUTCOMES[status]
