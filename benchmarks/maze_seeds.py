@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from flatpush.planning.obstacles import Search
 from tests.maze import check_way, stored_task
+
+from flatpush.planning.obstacles import Search
 
 
 def main(seeds: int, seconds: float) -> None:
