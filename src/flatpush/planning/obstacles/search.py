@@ -77,7 +77,7 @@ class Search:
         """
         if not self.task.first or not self.task.last:
             return
-        reaches = [Reach(self.task), Reach(self.task.reversed)]
+        reaches = [Reach(self.task)]
         self.disc, self.closed, self.direct = reaches[0].radius, not reaches[0].open, reaches[0].direct
         if self.closed:
             return
@@ -108,12 +108,16 @@ class Search:
         while True:
             level = level_of(self.task, reaches[0], k, changing)
             self.finest = min(self.finest, level.cell)
-            pair = [
-                Lattice(task, reach, level, self.cost * SLACK, self._rng)
-                for task, reach in zip((self.task, self.task.reversed), reaches, strict=True)
-            ]
+            pair: list[Lattice] = []
             while not any(lattice.done or lattice.size > MOST for lattice in pair):
-                for back, lattice in enumerate(pair):
+                for back in (0, 1):
+                    if len(pair) == back:
+                        # The way back is estimated only when it is needed: the first way often comes sooner.
+                        task = self.task.reversed if back else self.task
+                        if len(reaches) == back:
+                            reaches.append(Reach(task))
+                        pair.append(Lattice(task, reaches[back], level, self.cost * SLACK, self._rng))
+                    lattice = pair[back]
                     found = self._advance(lattice)
                     yield found.backwards(self.task.fleet, self.task.start) if found and back else found
                     if lattice.done:

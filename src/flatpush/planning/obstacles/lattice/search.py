@@ -45,7 +45,7 @@ class Reach:
         self.point, self.radius = largest_disc(task)
         ends = np.array([transform(X, self.point) for X in (task.start, task.goal)])
         box = extent(task)
-        cell = max(0.35 * self.radius, float(np.sqrt(np.prod(box[2:] - box[:2]) / 60_000)))
+        cell = max(0.35 * self.radius, float(np.sqrt(np.prod(box[2:] - box[:2]) / 6_000)))
         self.nx, self.ny = (int(n) + 1 for n in (box[2:] - box[:2]) / cell)
         self.cell, self.corner = cell, box[:2].copy()
         disc = np.array([self.radius])
