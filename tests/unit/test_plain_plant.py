@@ -103,3 +103,20 @@ def test_a_plain_plant_has_the_whole_interface(square):
     assert np.array_equal(got.outcome, want.outcome)
     assert slow.start([0, 0, 0], [-1.0, 0, 0], push_out=False).outcome == "starts inside"
     assert slow.start([0, 0, 0], [-1.0, 0, 0]).object == pytest.approx([0.1, 0, 0], abs=1e-7)
+
+
+def test_collinear_feet_go_the_plain_way():
+    """The kernels do not know them; a push through the middle, along their line, keeps the object straight."""
+    with pytest.warns(UserWarning, match="one line"):
+        support = fp.Support.points([(-0.5, 0.0), (0.0, 0.0), (0.5, 0.0)])
+    thing = fp.Object([(-1, -1), (1, -1), (1, 1), (-1, 1)], support, 0.5)
+    plant, way = Plant(thing, [[0.0, 0.0]], 0.1), [[-1.1, 0.0, 0.0], [-0.9, 0.0, 0.0], [-0.7, 0.0, 0.0]]
+    run = plant.follow([0, 0, 0], way)
+    assert run.outcome == ""
+    assert run.object[-1] == pytest.approx([0.4, 0.0, 0.0], abs=1e-6)
+    many = plant.many([[0, 0, 0], [0.1, 0, 0]], way, surfaces=[plant.surface] * 2)
+    assert many.final == pytest.approx(np.array([[0.4, 0, 0], [0.4, 0, 0]]), abs=1e-6)
+    aside = plant.follow([0, 0, 0], np.add(way, [0.0, 0.2, 0.0]))
+    assert aside.object[-1, 2] < -0.01  # pushed left of its middle, it turns clockwise
+    state = plant.step(plant.start([0, 0, 0], way[0]), [1.0, 0.0, 0.0], 0.1)
+    assert state.object == pytest.approx([0.1, 0.0, 0.0], abs=1e-6)

@@ -18,8 +18,9 @@ from ...problem.scene import Model
 from . import runs
 from .plain import Fingers
 from .runs import MODES, OUTCOMES
-from .table import outline_table, surface_table
+from .table import compilable, outline_table, surface_table
 
+UNKNOWN = -1  # kind of a surface that only the plain way knows
 _MANY, _UNDECIDED = OUTCOMES.index("too many contacts"), OUTCOMES.index("undecided")
 
 
@@ -90,7 +91,8 @@ class Plant:
     Args:
         thing: the object.
         fingers: fingertip centres in E, shape (k, 2), any number [m]. One and two are compiled, and anything that these
-            cannot decide (three contacts in a hollow) goes the plain way, as do three and more: far slower.
+            cannot decide (three contacts in a hollow) goes the plain way, as do three and more, and surfaces that the
+            kernels do not know (collinear feet): far slower.
         tip_radius: [m].
         model: limit surface (see problem.mechanics.surface_of; "local": about a push along +x of the hand is not known
             here, give it as surface).
@@ -101,7 +103,6 @@ class Plant:
 
     Raises:
         InputError: for fingers or numbers that make no sense.
-        FlatpushError: for a surface that the compiled simulation does not know (collinear feet).
 
     >>> thing = Object([(0, 0), (2, 0), (2, 2), (0, 2)], friction=0.5)
     >>> plant = Plant(thing, [[0.0, 0.0]], 0.1)
@@ -136,9 +137,10 @@ class Plant:
         self.surface = surface if surface is not None else surface_of(thing, model, np.array([1.0, 0.0]))
         self.fingers, self.tip_radius = tips, float(tip_radius)
         self.cof = _vector(thing.cof if cof is None else cof, 2, "a centre of friction")
-        self._plain = plain or len(tips) > 2
-        kind, table = surface_table(self.surface)
-        #: (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels.
+        known = compilable(self.surface)
+        self._plain = plain or len(tips) > 2 or not known
+        kind, table = surface_table(self.surface) if known else (UNKNOWN, np.zeros((1, 1)))
+        #: (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels (if they know the kind).
         self.pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
 
     def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
@@ -219,8 +221,12 @@ class Plant:
         kind, table, cof, shape, mu, radius, fingers = self.pack
         hands = np.array(hand, dtype=float)
         hands = self._way(hands)[None] if hands.ndim == 2 else np.stack([self._way(h) for h in hands])
-        tables = table[None]
-        if surfaces is not None:
+        tables, plain = table[None], self._plain
+        if surfaces is not None and (self._plain or not all(map(compilable, surfaces))):
+            plain = True
+            if len(surfaces) not in (1, n):
+                raise InputError(f"surfaces: one for all or one for each of {n} runs", value=len(surfaces))
+        elif surfaces is not None:
             packed = [surface_table(s) for s in surfaces]
             if len({(p[0], p[1].shape) for p in packed}) != 1:
                 raise InputError("the surfaces of many runs are of one kind and size")
@@ -248,7 +254,7 @@ class Plant:
         args = (kind, tables, centres, shape, mus, radius, fingers, objects, hands, int(body), int(push_out))
 
         begun = objects.copy()
-        if n and not self._plain:
+        if n and not plain:
             from .kernels import many as kernel
 
             def chunk(first: int) -> None:
@@ -257,7 +263,7 @@ class Plant:
             chunk(0)  # compiles, if need be, in one thread
             with ThreadPoolExecutor(workers) as pool:
                 list(pool.map(chunk, range(size, n, size)))
-        for r in range(n) if self._plain else np.flatnonzero(np.isin(outcome, (_MANY, _UNDECIDED))):
+        for r in range(n) if plain else np.flatnonzero(np.isin(outcome, (_MANY, _UNDECIDED))):
             self._again(int(r), begun[r], args, surfaces, push_out, poses, seen, outcome)
         bits = seen[..., 4].astype(int)
         stuck = ~np.any(bits & 0b1100, axis=(1, 2))
@@ -307,7 +313,7 @@ class Plant:
         """Run r of many, plainly."""
         kind, tables, cofs, shape, mus, radius, fingers, _, hands, body, _ = args
         mine = (kind, tables, cofs[r % len(cofs)], shape, float(mus[r % len(mus)]), radius, fingers)
-        written = self._written(mine, None if surfaces is None else surfaces[r])
+        written = self._written(mine, None if surfaces is None else surfaces[r % len(surfaces)])
         way = hands[r % len(hands)]
         if push_out:
             runs.push_out(written, q, way[0])
