@@ -1,0 +1,110 @@
+"""What a controller knows of a push that sticks: its flat point, its heading and how tightly it turns."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..geometry import cross, perpendicular, rotate
+from ..geometry.pose import Array
+from ..steering.car import Car
+from ..steering.flat import FlatOutput
+from .learning import SteeringEstimate
+
+
+@dataclass(frozen=True, eq=False)
+class SteeringModel:
+    """A push as its flat output, in the object frame O. Build with of_car, of_flat, or about() an estimate.
+
+    A finger that sticks makes the flat point run at s > 0 along the heading while the object turns at any ω within
+    -right ≤ ω/s ≤ left; what the pusher must do for that is the rigid motion of its place on the object.
+
+    Attributes:
+        flat_point: shape (2,) [m].
+        heading: from O's +x to the way the flat point moves [rad].
+        left, right: most turn per length to either side, what the friction cone allows [1/m].
+        contact: the contact point, shape (2,).
+        pusher: X_OE while it sticks, shape (3,).
+        turns: whether the pusher turns with the object; if not, its round finger rolls on it.
+    """
+
+    flat_point: Array
+    heading: float
+    left: float
+    right: float
+    contact: Array
+    pusher: Array
+    turns: bool = True
+
+    def __post_init__(self) -> None:
+        for name, size in (("flat_point", 2), ("contact", 2), ("pusher", 3)):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != (size,) or not np.all(np.isfinite(value)):
+                raise InputError(f"{size} finite numbers are needed", key=name, value=getattr(self, name))
+            object.__setattr__(self, name, value)
+        if not (np.isfinite(self.heading) and 0 < self.left < np.inf and 0 < self.right < np.inf):
+            raise InputError(
+                "a model has a finite heading and turns to both sides",
+                value=(self.heading, self.left, self.right),
+            )
+        d = self.flat_point - self.contact
+        if float(d @ self.direction) <= 0:
+            raise InputError("the flat point lies ahead of the contact", value=self.flat_point)
+
+    @classmethod
+    def of_car(cls, car: Car, turns: bool = True) -> "SteeringModel":
+        """Of a car; its flat point is the midpoint of the turning centres, and its heading is across them."""
+        span = car.left_centre - car.right_centre
+        across = -perpendicular(span)
+        contact = car.contact.point + car.cof
+        k = 1 / car.radius
+        angle = float(np.arctan2(across[1], across[0]))
+        return cls(car.flat_point, angle, k, k, contact, car.pusher, turns)
+
+    @classmethod
+    def of_flat(
+        cls, flat: FlatOutput, pusher: ArrayLike | None = None, turns: bool = True
+    ) -> "SteeringModel":
+        """Of a flat output; the contact's frame is O, or the pusher stands at the contact."""
+        p, n = flat.contact.point, flat.contact.normal
+        stands = np.array([*p, np.arctan2(n[1], n[0])]) if pusher is None else pusher
+        left, right = flat.along - flat.c_right, flat.c_left - flat.along
+        return cls(
+            flat.flat_point, flat.heading_offset, 1 / left, 1 / right, p, np.asarray(stands, float), turns
+        )
+
+    @property
+    def direction(self) -> Array:
+        """h in O, shape (2,)."""
+        return np.array([np.cos(self.heading), np.sin(self.heading)])
+
+    @property
+    def arm(self) -> Array:
+        """From the flat point to what the pusher moves: its own origin, or the contact where it rolls; in O (2,)."""
+        return (self.pusher[:2] if self.turns else self.contact) - self.flat_point
+
+    def about(self, estimate: SteeringEstimate) -> "SteeringModel":
+        """The same push by an estimate in O: the flat point moves to the new axle, ahead of the contact as before."""
+        axle = estimate.axle(self.contact)
+        h = axle.heading
+        c = float(cross(self.flat_point - self.contact, self.direction))  # to the right
+        point = self.contact + axle.offset * h - c * perpendicular(h)
+        return replace(self, flat_point=point, heading=float(np.arctan2(h[1], h[0])))
+
+    def motion(self, velocity: ArrayLike) -> tuple[float, float]:
+        """Flat speed and ω of the object under a velocity in O (2,) of the pusher (where it turns) or contact."""
+        u, h = np.asarray(velocity, dtype=float), self.direction
+        q = perpendicular(self.arm)
+        omega = float(cross(h, u)) / float(cross(h, q))
+        return float((u - omega * q) @ h), omega
+
+    def twist(self, speed: float, omega: float) -> Array:
+        """Body twist in O for a flat speed and ω, shape (3,)."""
+        return np.array([*(speed * self.direction - omega * perpendicular(self.flat_point)), omega])
+
+    def flat_of(self, pose: ArrayLike) -> tuple[float, float, float]:
+        """Flat point x, y and heading in W at a pose X_WO."""
+        x, y, turn = (float(v) for v in np.asarray(pose, dtype=float))
+        z = rotate(turn, self.flat_point)
+        return x + float(z[0]), y + float(z[1]), turn + self.heading
