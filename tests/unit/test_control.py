@@ -145,7 +145,7 @@ class Swing(AbstractReference):
 def test_references_that_rest_or_reverse_are_refused():
     _, model = square_push()
     for back in (True, False):
-        with pytest.raises(fp.InputError, match="reverses|vanishes"):
+        with pytest.raises(fp.InputError, match=r"reverses|vanishes"):
             TrackingController(model, Gains(4, 4), reference=Swing(back))
     tight = PathReference(np.array([[0, 0.1, 0, 0, 0, 2 * model.left]]), 0.02)
     with pytest.raises(fp.InputError, match="friction cone"):
