@@ -123,6 +123,8 @@ class _Linearised(AbstractController[TrackingState]):
             float(pose[2]) + m.heading, speed, omega, float(m.arm[0]), float(m.arm[1]), float(pose[2]),
             1 / self.rate, HOLDS.index(self.hold),
         )  # fmt: skip
+        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega / self.rate
+        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
         velocity = np.array([ux, uy, omega if m.turns else 0.0])
         if not np.all(np.isfinite(velocity)):
             return self._stop(state, time, "the law gave no finite command")

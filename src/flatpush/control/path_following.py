@@ -155,6 +155,8 @@ class PathController(AbstractController[PathState]):
             dt,
             RAMP,
         )
+        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega * dt
+        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
         slow = min(1.0, self.fastest / max(float(np.hypot(ux, uy)), 1e-300))
         velocity = slow * np.array([ux, uy, omega if m.turns else 0.0])
         if not np.all(np.isfinite(velocity)):

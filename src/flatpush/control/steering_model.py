@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..geometry import cross, perpendicular, rotate
+from ..geometry import cross, perpendicular, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
 from ..steering.car import Car
 from ..steering.flat import FlatOutput
 from .learning import SteeringEstimate
+
+# Turns per length at which the drift is computed, and halvings of the force's angle for each.
+_SAMPLES, _HALVINGS = 21, 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,8 @@ class SteeringModel:
         contact: the contact point, shape (2,).
         pusher: X_OE while it sticks, shape (3,).
         turns: whether the pusher turns with the object; if not, its round finger rolls on it.
+        drift: how far the flat point moves to its left, per length along the heading, at turns per length evenly from
+            -right to left, shape (n,): zero for an ellipsoidal limit surface, on which flatness is exact.
     """
 
     flat_point: Array
@@ -36,6 +41,7 @@ class SteeringModel:
     contact: Array
     pusher: Array
     turns: bool = True
+    drift: Array | None = None
 
     def __post_init__(self) -> None:
         for name, size in (("flat_point", 2), ("contact", 2), ("pusher", 3)):
@@ -53,14 +59,31 @@ class SteeringModel:
             raise InputError("the flat point lies ahead of the contact", value=self.flat_point)
 
     @classmethod
-    def of_car(cls, car: Car, turns: bool = True) -> "SteeringModel":
-        """Of a car; its flat point is the midpoint of the turning centres, and its heading is across them."""
+    def of_car(cls, car: Car, turns: bool = True, whole: Car | None = None) -> "SteeringModel":
+        """Of a car; its flat point is the midpoint of the turning centres, and its heading is across them.
+
+        Args:
+            whole: the car of the same push without a margin, whose turns are the limits; default: the car itself.
+        """
         span = car.left_centre - car.right_centre
         across = -perpendicular(span)
-        contact = car.contact.point + car.cof
-        k = 1 / car.radius
         angle = float(np.arctan2(across[1], across[0]))
-        return cls(car.flat_point, angle, k, k, contact, car.pusher, turns)
+        full = car if whole is None else whole
+        h = np.array([np.cos(angle), np.sin(angle)])
+        n = perpendicular(h)
+        left, right = (
+            float((full.left_centre - car.flat_point) @ n),
+            float((car.flat_point - full.right_centre) @ n),
+        )
+        edge = 1 - 1e-6  # the edges themselves belong to sliding
+        kappas = np.linspace(-edge / right, edge / left, _SAMPLES)
+        drift = np.zeros(_SAMPLES)
+        for k, kappa in enumerate(kappas):
+            # Twists of the whole car, per length of its own flat point; of ours, along our heading.
+            v = velocity_at(_twist(full, car.flat_point, h, float(kappa)), car.flat_point)
+            drift[k] = float(v @ n) / float(v @ h)
+        contact = car.contact.point + car.cof
+        return cls(car.flat_point, angle, edge / left, edge / right, contact, car.pusher, turns, drift)
 
     @classmethod
     def of_flat(
@@ -95,16 +118,44 @@ class SteeringModel:
     def motion(self, velocity: ArrayLike) -> tuple[float, float]:
         """Flat speed and ω of the object under a velocity in O (2,) of the pusher (where it turns) or contact."""
         u, h = np.asarray(velocity, dtype=float), self.direction
-        q = perpendicular(self.arm)
-        omega = float(cross(h, u)) / float(cross(h, q))
-        return float((u - omega * q) @ h), omega
+        q, n = perpendicular(self.arm), perpendicular(h)
+        across = 0.0
+        for _ in range(1 if self.drift is None else 3):
+            omega = float(cross(h, u - across * n)) / float(cross(h, q))
+            speed = float((u - omega * q) @ h)
+            across = self.across(speed, omega)
+        return speed, omega
+
+    def across(self, speed: float, omega: float) -> float:
+        """Speed of the flat point to its left, of a flat speed and ω [m/s]; see drift."""
+        if self.drift is None or speed <= 0:
+            return 0.0
+        place = (omega / speed + self.right) / (self.left + self.right) * (len(self.drift) - 1)
+        place = min(max(place, 0.0), len(self.drift) - 1.000001)
+        k = int(place)
+        d = self.drift
+        return speed * float(d[k] + (place - k) * (d[k + 1] - d[k]))
 
     def twist(self, speed: float, omega: float) -> Array:
         """Body twist in O for a flat speed and ω, shape (3,)."""
-        return np.array([*(speed * self.direction - omega * perpendicular(self.flat_point)), omega])
+        h = self.direction
+        v = speed * h + self.across(speed, omega) * perpendicular(h)
+        return np.array([*(v - omega * perpendicular(self.flat_point)), omega])
 
     def flat_of(self, pose: ArrayLike) -> tuple[float, float, float]:
         """Flat point x, y and heading in W at a pose X_WO."""
         x, y, turn = (float(v) for v in np.asarray(pose, dtype=float))
         z = rotate(turn, self.flat_point)
         return x + float(z[0]), y + float(z[1]), turn + self.heading
+
+
+def _twist(car: Car, point: Array, h: Array, kappa: float) -> Array:
+    """The sticking twist in O whose turn, per length of a point along h, is kappa; by halving the force's angle."""
+    left, _, right = car.contact.force_angles(car.forces)
+    V = np.zeros(3)
+    for _ in range(_HALVINGS):
+        angle = 0.5 * (left + right)
+        V = shift_twist(car.surface.twist(car.contact.wrench(rotate(angle, car.contact.normal))), -car.cof)
+        turn = float(V[2]) / float(velocity_at(V, point) @ h)
+        left, right = (angle, right) if turn < kappa else (left, angle)
+    return V
