@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-from tests.unit.test_control import NOMINAL, square_push
 
 from flatpush.control import Measurement
 from flatpush.control.gains import Gains
@@ -17,10 +16,11 @@ from flatpush.control.linearisation import TrackingController
 from flatpush.control.path_following import PathController
 from flatpush.control.reference import PathReference
 from flatpush.control.rollouts import closed_loops
+from flatpush.experiments.fig4 import NOMINAL, matrix, push_model
 
 
 def controllers():
-    _, model = square_push()
+    model = push_model()
     x, y, heading = model.flat_of([0, 0, 0])
     path = PathReference(np.array([[0.0, 0.0077 * 31, x, y, heading, 10.0]]), 0.0077)
     return {
@@ -34,11 +34,11 @@ def test_closed_loop_runs(law):
     count = int(os.environ.get("FLATPUSH_RUNS", "10000"))
     controller = controllers()[law]
     starts = np.random.default_rng(0).normal(size=(count, 3)) * [0.001, 0.001, 0.05]
-    closed_loops(controller, [0, 1], starts[:2], NOMINAL, 1.0)
+    closed_loops(controller, [0, 1], starts[:2], matrix(NOMINAL), 1.0)
     spent = []
     for _ in range(3):
         begun = time.process_time()
-        closed_loops(controller, [0, 1], starts, NOMINAL, 30.0, threads=1)
+        closed_loops(controller, [0, 1], starts, matrix(NOMINAL), 30.0, threads=1)
         spent.append(time.process_time() - begun)
     print(f"\n{law}: {count} runs of 30 s at 60 Hz: {min(spent):.2f} s of one core")
 

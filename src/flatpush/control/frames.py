@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry import compose, exp, rotate
 from ..geometry.pose import Array
 from .measurement import Measurement
 from .steering_model import SteeringModel
@@ -57,14 +56,11 @@ def with_command(seen: Seen, time: float, velocity: Array) -> Seen:
 def predicted(seen: Seen, time: float, model: SteeringModel) -> Array:
     """X_WO now: the frame's pose moved on by the commands given since its exposure, as the model sticks."""
     assert seen.frame is not None
-    X = np.asarray(seen.frame.object, dtype=float)
+    x, y, turn = (float(v) for v in seen.frame.object)
     for k, (begun, velocity) in enumerate(seen.told):
         ended = seen.told[k + 1][0] if k + 1 < len(seen.told) else time
         dt = min(ended, time) - max(begun, seen.frame.time)
-        if dt <= 1e-12 or not np.any(velocity):
-            continue
-        s, omega = model.motion(rotate(-X[2], velocity[:2]))
-        # Once more with the heading of the middle of the stretch, in which the pusher goes straight.
-        s, omega = model.motion(rotate(-(X[2] + 0.5 * omega * dt), velocity[:2]))
-        X = compose(X, exp(dt * model.twist(s, omega)))
-    return X
+        ux, uy = float(velocity[0]), float(velocity[1])
+        if dt > 1e-12 and (ux != 0 or uy != 0):
+            x, y, turn = model.moved(x, y, turn, ux, uy, dt)
+    return np.array([x, y, turn])

@@ -1,6 +1,8 @@
 """What a controller knows of a push that sticks: its flat point, its heading and how tightly it turns."""
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -115,16 +117,44 @@ class SteeringModel:
         point = self.contact + axle.offset * h - c * perpendicular(h)
         return replace(self, flat_point=point, heading=float(np.arctan2(h[1], h[0])))
 
-    def motion(self, velocity: ArrayLike) -> tuple[float, float]:
-        """Flat speed and ω of the object under a velocity in O (2,) of the pusher (where it turns) or contact."""
-        u, h = np.asarray(velocity, dtype=float), self.direction
-        q, n = perpendicular(self.arm), perpendicular(h)
+    @cached_property
+    def _numbers(self) -> tuple[float, ...]:
+        """h, the arm and the flat point as plain numbers: a control step is made of few of numpy's."""
+        h, r, z = self.direction, self.arm, self.flat_point
+        return float(h[0]), float(h[1]), float(r[0]), float(r[1]), float(z[0]), float(z[1])
+
+    def motion(self, ux: float, uy: float) -> tuple[float, float]:
+        """Flat speed and ω of the object under a velocity in O of the pusher (where it turns) or contact."""
+        hx, hy, rx, ry, _, _ = self._numbers
         across = 0.0
         for _ in range(1 if self.drift is None else 3):
-            omega = float(cross(h, u - across * n)) / float(cross(h, q))
-            speed = float((u - omega * q) @ h)
+            vx, vy = ux + across * hy, uy - across * hx
+            omega = (hx * vy - hy * vx) / (hx * rx + hy * ry)
+            speed = (vx + omega * ry) * hx + (vy - omega * rx) * hy
             across = self.across(speed, omega)
         return speed, omega
+
+    def moved(
+        self, x: float, y: float, turn: float, ux: float, uy: float, dt: float
+    ) -> tuple[float, float, float]:
+        """X_WO after a time in which the pusher goes straight with a velocity in W and the contact sticks."""
+        hx, hy, _, _, zx, zy = self._numbers
+        middle, speed, omega = turn, 0.0, 0.0
+        for _ in range(2):  # the second time with the heading of the middle of the stretch
+            c, d = math.cos(middle), math.sin(middle)
+            speed, omega = self.motion(c * ux + d * uy, c * uy - d * ux)
+            middle = turn + 0.5 * omega * dt
+        # The flat point's chord, then O about it.
+        half = 0.5 * omega * dt
+        chord = dt * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+        across = self.across(speed, omega)
+        vx, vy = chord * (speed * hx - across * hy), chord * (speed * hy + across * hx)
+        c, d = math.cos(middle), math.sin(middle)
+        px, py = c * vx - d * vy, d * vx + c * vy
+        c, d = math.cos(turn), math.sin(turn)
+        px, py, turn = px + c * zx - d * zy, py + d * zx + c * zy, turn + omega * dt
+        c, d = math.cos(turn), math.sin(turn)
+        return x + px - c * zx + d * zy, y + py - d * zx - c * zy, turn
 
     def across(self, speed: float, omega: float) -> float:
         """Speed of the flat point to its left, of a flat speed and ω [m/s]; see drift."""
@@ -145,8 +175,9 @@ class SteeringModel:
     def flat_of(self, pose: ArrayLike) -> tuple[float, float, float]:
         """Flat point x, y and heading in W at a pose X_WO."""
         x, y, turn = (float(v) for v in np.asarray(pose, dtype=float))
-        z = rotate(turn, self.flat_point)
-        return x + float(z[0]), y + float(z[1]), turn + self.heading
+        _, _, _, _, zx, zy = self._numbers
+        c, d = math.cos(turn), math.sin(turn)
+        return x + c * zx - d * zy, y + d * zx + c * zy, turn + self.heading
 
 
 def _twist(car: Car, point: Array, h: Array, kappa: float) -> Array:
