@@ -9,7 +9,7 @@ import warnings
 import typer
 
 from ..errors import FlatpushError
-from . import describe, experiment, export, identify, init, plan, simulate, verify
+from . import describe, experiment, export, identify, init, plan, simulate, track, verify
 
 app = typer.Typer(
     name="flatpush",
@@ -25,6 +25,7 @@ app.command("verify")(verify.command)
 app.command("simulate")(simulate.command)
 app.command("describe")(describe.command)
 app.command("export")(export.command)
+app.command("track")(track.command)
 app.command("identify")(identify.command)
 app.command("init")(init.command)
 app.command("experiment")(experiment.command)

@@ -10,6 +10,7 @@ from ..errors import InputError
 
 EXPERIMENTS = {
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
+    "fig4": "feedback linearisation of a single-finger push, and what its numbers mean (paper, Fig. 4)",
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
     "cone": "two fingers with their composite cone against their virtual middle contact",

@@ -1,0 +1,59 @@
+"""Time of closed-loop runs and of one control step from Python.
+
+`pytest benchmarks/test_control.py -n 0 -s` prints them; CPU time of one thread, so that other work on the machine does
+not count. FLATPUSH_RUNS sets how many runs there are (10,000 of 30 s at 60 Hz by default). Nothing is asserted.
+"""
+
+import os
+import time
+
+import numpy as np
+import pytest
+
+from flatpush.control import Measurement
+from flatpush.control.gains import Gains
+from flatpush.control.linearisation import TrackingController
+from flatpush.control.path_following import PathController
+from flatpush.control.reference import PathReference
+from flatpush.control.rollouts import closed_loops
+from flatpush.experiments.fig4 import NOMINAL, matrix, push_model
+
+
+def controllers():
+    model = push_model()
+    x, y, heading = model.flat_of([0, 0, 0])
+    path = PathReference(np.array([[0.0, 0.0077 * 31, x, y, heading, 10.0]]), 0.0077)
+    return {
+        "dfl": TrackingController(model, Gains(4, 4), reference=path),
+        "path": PathController(model, path),
+    }
+
+
+@pytest.mark.parametrize("law", ["dfl", "path"])
+def test_closed_loop_runs(law):
+    count = int(os.environ.get("FLATPUSH_RUNS", "10000"))
+    controller = controllers()[law]
+    starts = np.random.default_rng(0).normal(size=(count, 3)) * [0.001, 0.001, 0.05]
+    closed_loops(controller, [0, 1], starts[:2], matrix(NOMINAL), 1.0)
+    spent = []
+    for _ in range(3):
+        begun = time.process_time()
+        closed_loops(controller, [0, 1], starts, matrix(NOMINAL), 30.0, threads=1)
+        spent.append(time.process_time() - begun)
+    print(f"\n{law}: {count} runs of 30 s at 60 Hz: {min(spent):.2f} s of one core")
+
+
+@pytest.mark.parametrize("law", ["dfl", "path"])
+def test_control_step(law):
+    controller = controllers()[law]
+    spent = []
+    for _ in range(5):
+        state = controller.start()
+        begun = time.thread_time()
+        for k in range(500):
+            frame = (
+                Measurement(k / 60, np.array([0, 0.0077 * k / 60, 0]), np.zeros(3)) if k % 2 == 0 else None
+            )
+            state, _ = controller.step(state, frame, k / 60 + 0.1)
+        spent.append((time.thread_time() - begun) / 500)
+    print(f"\n{law}: {1e3 * min(spent):.3f} ms a step, 30 Hz camera with 100 ms latency")

@@ -1,0 +1,1 @@
+"""Feedback laws on plain numbers, and the same compiled."""

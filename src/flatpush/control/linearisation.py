@@ -1,0 +1,255 @@
+"""Dynamic feedback linearisation of a sticking push: tracking in time, and stabilising at a pose.
+
+[Zhou2017] Sec. 4.1, Eqs. 34-46 (docs/errata.md rows 2, 11 and 15), for any contact: the compensator's state is the flat
+speed. Towards the end of a reference, where it is at rest, the path law takes over.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..geometry import pose_error, wrap_angle
+from ..geometry.pose import Array
+from .controller import ARRIVED, AbstractController, ControllerState
+from .frames import Seen, after, predicted, refusal, with_command
+from .gains import HOLDS, Gains, Hold
+from .laws.plain import linearised, point_velocity
+from .measurement import STOP, Command, Measurement
+from .reference import AbstractReference, PathReference, check_reference
+from .steering_model import SteeringModel
+
+# Bounds of the flat speed, by that of the reference: the law divides by it.
+FLOOR, CAP = 0.1, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingState(ControllerState):
+    """Of TrackingController and PostureController.
+
+    Attributes:
+        begun: when it started [s].
+        speed: the compensator's state s [m/s]; nan before the first measurement.
+        seen: the newest frame, and commands since.
+        scale: of w in the last tick; below 1 the friction cone bounded it.
+        length: arc length reached, once the path law has taken over [m].
+    """
+
+    begun: float = 0.0
+    speed: float = float("nan")
+    seen: Seen = field(default_factory=Seen)
+    scale: float = 1.0
+    length: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised(AbstractController[TrackingState]):
+    model: SteeringModel
+    gains: Gains
+    rate: float = 60.0
+    hold: Hold = "ramp"
+    body: str = ""
+    stale: float = 0.5
+
+    def start(self, time: float = 0.0) -> TrackingState:
+        if not np.isfinite(time):
+            raise InputError("a time is finite", value=time)
+        return TrackingState(begun=time)
+
+    def _check(self) -> None:
+        self.gains.check(self.rate, self.hold)
+        if not (np.isfinite(self.stale) and self.stale > 0):
+            raise InputError(
+                "the age at which a measurement is too old is positive", key="stale", value=self.stale
+            )
+
+    def _pose(
+        self, state: TrackingState, measurement: Measurement | None, time: float
+    ) -> tuple[TrackingState, Array | None]:
+        """The state with the measurement, and the pose of now; None where there is nothing good to go by."""
+        if measurement is not None:
+            wrong = refusal(measurement, state.seen, time, self.body, self.stale)
+            if wrong:
+                held = replace(
+                    state, mode="held", note=wrong, seen=with_command(state.seen, time, np.zeros(3))
+                )
+                return held, None
+            state = replace(state, seen=after(state.seen, measurement))
+        frame = state.seen.frame
+        if frame is None or time - frame.time > self.stale:
+            note = (
+                "no measurement yet"
+                if frame is None
+                else f"the last measurement is {time - frame.time:.3g} s old"
+            )
+            return replace(
+                state, mode="waiting", note=note, seen=with_command(state.seen, time, np.zeros(3))
+            ), None
+        return state, predicted(state.seen, time, self.model)
+
+    def _tick(
+        self,
+        state: TrackingState,
+        pose: Array,
+        time: float,
+        target: tuple[Array, Array, Array],
+        nominal: float,
+    ) -> tuple[TrackingState, Command]:
+        m, dt = self.model, 1.0 / self.rate
+        x, y, heading = m.flat_of(pose)
+        z, dz, ddz = target
+        (kpx, kpy), (kdx, kdy) = self.gains.kp, self.gains.kd
+        s0 = nominal if np.isnan(state.speed) else state.speed
+        speed, out, omega, scale, bounded = linearised(
+            x, y, heading, s0, float(z[0]), float(z[1]), float(dz[0]), float(dz[1]), float(ddz[0]), float(ddz[1]),
+            float(kpx), float(kpy), float(kdx), float(kdy), m.left, m.right, FLOOR * nominal, CAP * nominal, dt,
+            HOLDS.index(self.hold),
+        )  # fmt: skip
+        mode, note = "tracking", ""
+        if scale < 1:
+            mode, note = "saturated", f"the friction cone allows {100 * scale:.0f} % of the correction"
+        elif bounded:
+            mode, note = "guarded", "the flat speed is at its bound"
+        return self._command(
+            replace(state, mode=mode, note=note, speed=speed, scale=scale), pose, time, out, omega
+        )
+
+    def _command(
+        self, state: TrackingState, pose: Array, time: float, speed: float, omega: float
+    ) -> tuple[TrackingState, Command]:
+        m = self.model
+        ux, uy = point_velocity(
+            float(pose[2]) + m.heading, speed, omega, float(m.arm[0]), float(m.arm[1]), float(pose[2]),
+            1 / self.rate, HOLDS.index(self.hold),
+        )  # fmt: skip
+        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega / self.rate
+        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
+        velocity = np.array([ux, uy, omega if m.turns else 0.0])
+        if not np.all(np.isfinite(velocity)):
+            return self._stop(state, time, "the law gave no finite command")
+        return replace(state, seen=with_command(state.seen, time, velocity)), Command(velocity)
+
+    def _stop(self, state: TrackingState, time: float, outcome: str) -> tuple[TrackingState, Command]:
+        return replace(state, mode="done", outcome=outcome), STOP
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingController(_Linearised):
+    """Tracks a reference in time.
+
+    Args:
+        model: of the push. gains: along x and y of W. rate: of the ticks [Hz], 10 to 1000 and beyond.
+        hold: how the pusher moves in a tick, see gains.Hold.
+        body: name of the object; frames of others are refused. stale: age at which a frame is too old [s].
+        reference: of the flat point.
+        finish: after the reference has ended, follow its path on until its end is abeam.
+
+    Raises:
+        InputError: for gains that are unstable at the rate, and references that rest or reverse on the way or turn
+            tighter than the push can.
+    """
+
+    reference: AbstractReference = None  # type: ignore[assignment]
+    finish: bool = True
+
+    def __post_init__(self) -> None:
+        self._check()
+        if self.reference is None:
+            raise InputError("a reference is needed", key="reference")
+        # Dubins references turn as tightly as their margin allows, the model a little more.
+        check_reference(self.reference, max(self.model.left, self.model.right))
+
+    def step(
+        self, state: TrackingState, measurement: Measurement | None, time: float
+    ) -> tuple[TrackingState, Command]:
+        if state.outcome:
+            return state, STOP
+        if not np.isfinite(time):
+            return replace(state, mode="held", note="the time is not finite"), STOP
+        state, pose = self._pose(state, measurement, time)
+        if pose is None:
+            return state, STOP
+        t, T = time - state.begun, self.reference.duration
+        if t >= T - 1e-9:
+            return self._ending(state, pose, time)
+        target = self.reference.at(t)
+        nominal = float(np.hypot(*self.reference.at(0.5 * T).velocity))
+        return self._tick(state, pose, time, target, nominal)
+
+    def _ending(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
+        """At rest the arc-length law takes over, until the end of the path is abeam."""
+        from .path_following import path_command
+
+        path = self.reference
+        if not (self.finish and isinstance(path, PathReference)):
+            return self._stop(state, time, ARRIVED)
+        length = state.length if state.mode == "path" else path.length
+        found = path_command(self.model, path, pose, length, path.speed, 1 / self.rate)
+        if found is None:
+            return self._stop(state, time, ARRIVED)
+        speed, omega, length, _ = found
+        return self._command(replace(state, mode="path", note="", length=length), pose, time, speed, omega)
+
+
+@dataclass(frozen=True, eq=False)
+class PostureController(_Linearised):
+    """Brings the object to a pose and stops: [Zhou2017]'s law with a reference at rest.
+
+    Works forward only: from behind the goal, roughly in its heading; across the goal's heading the gains are stiffer
+    than along it, so that the flat point arrives along it. Gains of the model's own axes: kp, kd [0] along the goal's
+    heading, [1] across.
+
+    Args:
+        goal: X_WO (3,). speed: the flat speed it starts with [m/s]. tolerance: (m, rad) within which it has arrived.
+    """
+
+    goal: ArrayLike = (0.0, 0.0, 0.0)
+    speed: float = 0.02
+    tolerance: tuple[float, float] = (0.0005, float(np.deg2rad(0.5)))
+
+    def __post_init__(self) -> None:
+        self._check()
+        goal = np.array(self.goal, dtype=float)
+        if goal.shape != (3,) or not np.all(np.isfinite(goal)):
+            raise InputError("a goal is three finite numbers", key="goal", value=self.goal)
+        if not (np.isfinite(self.speed) and self.speed > 0):
+            raise InputError("a flat speed is positive", key="speed", value=self.speed)
+
+    def step(
+        self, state: TrackingState, measurement: Measurement | None, time: float
+    ) -> tuple[TrackingState, Command]:
+        if state.outcome:
+            return state, STOP
+        if not np.isfinite(time):
+            return replace(state, mode="held", note="the time is not finite"), STOP
+        state, pose = self._pose(state, measurement, time)
+        if pose is None:
+            return state, STOP
+        goal = np.asarray(self.goal, dtype=float)
+        gx, gy, angle = self.model.flat_of(goal)
+        x, y, heading = self.model.flat_of(pose)
+        c, d = np.cos(angle), np.sin(angle)
+        ahead, left = (gx - x) * c + (gy - y) * d, -((y - gy) * c - (x - gx) * d)
+        error = pose_error(pose, goal)
+        if np.hypot(error[0], error[1]) <= self.tolerance[0] and abs(error[2]) <= self.tolerance[1]:
+            return self._stop(state, time, ARRIVED)
+        if ahead <= 0:
+            return self._stop(
+                state,
+                time,
+                f"the goal's position is abeam, {1000 * abs(left):.2f} mm aside; a finger cannot pull",
+            )
+        # In the goal's axes, so that along and across have gains of their own.
+        (kpa, kpc), (kda, kdc) = self.gains.kp, self.gains.kd
+        s0 = self.speed if np.isnan(state.speed) else state.speed
+        m = self.model
+        speed, out, omega, scale, bounded = linearised(
+            -ahead, -left, float(wrap_angle(heading - angle)), s0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+            float(kpa), float(kpc), float(kda), float(kdc), m.left, m.right, FLOOR * self.speed, CAP * self.speed,
+            1 / self.rate, HOLDS.index(self.hold),
+        )  # fmt: skip
+        mode = "saturated" if scale < 1 else "guarded" if bounded else "posture"
+        return self._command(
+            replace(state, mode=mode, note="", speed=speed, scale=scale), pose, time, out, omega
+        )

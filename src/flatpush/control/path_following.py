@@ -1,0 +1,167 @@
+"""Following the path of a push in arc length, without a singularity at rest: the default for Dubins references."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.pose import Array
+from .controller import ARRIVED, AbstractController, ControllerState
+from .frames import Seen, after, predicted, refusal, with_command
+from .gains import limits
+from .laws.plain import RAMP, along_path, nearest, point_velocity, wrapped
+from .measurement import STOP, Command, Measurement
+from .reference import PathReference
+from .steering_model import SteeringModel
+
+# Poles of the default gains, per turning radius of the flat point: both at -2 / R.
+POLE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class PathState(ControllerState):
+    """Of PathController: arc length reached [m], the newest frame and the commands since."""
+
+    length: float = 0.0
+    seen: Seen = field(default_factory=Seen)
+
+
+def path_gains(model: SteeringModel) -> tuple[float, float]:
+    """Stiffness [1/m²] and damping [1/m] with a double pole at -POLE times the tightest turn."""
+    pole = POLE * min(model.left, model.right)
+    return pole * pole, 2 * pole
+
+
+def path_command(
+    model: SteeringModel,
+    path: PathReference,
+    pose: Array,
+    length: float,
+    speed: float,
+    dt: float,
+    gains: tuple[float, float] | None = None,
+) -> tuple[float, float, float, bool] | None:
+    """Flat speed, ω, arc length abeam and whether the turn is at its limit; None where the end is abeam or behind."""
+    x, y, heading = model.flat_of(pose)
+    reach = 0.25 / max(model.left, model.right)
+    length = nearest(path.table, x, y, length, max(reach, 2 * speed * dt))
+    from .laws.plain import place
+
+    px, py, angle, bend = place(path.table, length)
+    left = (y - py) * np.cos(angle) - (x - px) * np.sin(angle)
+    psi = wrapped(heading - angle)
+    remaining = path.length - length
+    if remaining <= 1e-9:
+        return None
+    k1, k2 = gains if gains is not None else path_gains(model)
+    kappa, bounded = along_path(float(left), psi, bend, k1, k2, model.left, model.right)
+    # The last tick is a short one: a pusher cannot come back.
+    speed = min(speed, remaining / (dt * max(0.2, float(np.cos(psi)))))
+    return speed, kappa * speed, length, bounded
+
+
+@dataclass(frozen=True, eq=False)
+class PathController(AbstractController[PathState]):
+    """Follows a path at a flat speed, wherever along it the object is.
+
+    Args:
+        model: of the push. path: of its flat point, and the flat speed. rate: of the ticks [Hz].
+        stiffness, damping: gains k₁ [1/m²] and k₂ [1/m]; default: see path_gains.
+        fastest: the pusher's speed limit [m/s]; turning, the pusher is faster than the flat point.
+        body, stale: as for TrackingController.
+
+    Raises:
+        InputError: for gains that are unstable at this rate and speed.
+    """
+
+    model: SteeringModel
+    path: PathReference
+    rate: float = 60.0
+    stiffness: float | None = None
+    damping: float | None = None
+    fastest: float = float("inf")
+    body: str = ""
+    stale: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise InputError("a rate is positive", key="rate", value=self.rate)
+        if not (np.isfinite(self.stale) and self.stale > 0):
+            raise InputError(
+                "the age at which a measurement is too old is positive", key="stale", value=self.stale
+            )
+        if not self.fastest > 0:
+            raise InputError("a speed limit is positive", key="fastest", value=self.fastest)
+        k1, k2 = self.gains
+        if not (np.isfinite(k1) and np.isfinite(k2) and k1 > 0 and k2 > 0):
+            raise InputError("stiffness and damping are positive and finite", value=(k1, k2))
+        low, high = limits(k1, self.rate / self.path.speed)  # ticks per metre
+        if not low < k2 < high:
+            raise InputError(
+                f"at {self.rate:g} Hz and {1000 * self.path.speed:g} mm/s a stiffness of {k1:.4g}/m² is stable with a"
+                f" damping between {low:.4g} and {high:.4g}/m",
+                key="damping", value=k2, hint="Change the gains, the rate or the speed.",
+            )  # fmt: skip
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        k1, k2 = path_gains(self.model)
+        return (
+            k1 if self.stiffness is None else float(self.stiffness),
+            k2 if self.damping is None else float(self.damping),
+        )
+
+    def start(self, time: float = 0.0) -> PathState:
+        if not np.isfinite(time):
+            raise InputError("a time is finite", value=time)
+        return PathState()
+
+    def step(
+        self, state: PathState, measurement: Measurement | None, time: float
+    ) -> tuple[PathState, Command]:
+        if state.outcome:
+            return state, STOP
+        if not np.isfinite(time):
+            return replace(state, mode="held", note="the time is not finite"), STOP
+        stop = np.zeros(3)
+        if measurement is not None:
+            wrong = refusal(measurement, state.seen, time, self.body, self.stale)
+            if wrong:
+                return replace(
+                    state, mode="held", note=wrong, seen=with_command(state.seen, time, stop)
+                ), STOP
+            state = replace(state, seen=after(state.seen, measurement))
+        frame = state.seen.frame
+        if frame is None or time - frame.time > self.stale:
+            note = (
+                "no measurement yet"
+                if frame is None
+                else f"the last measurement is {time - frame.time:.3g} s old"
+            )
+            return replace(state, mode="waiting", note=note, seen=with_command(state.seen, time, stop)), STOP
+        m, dt = self.model, 1 / self.rate
+        pose = predicted(state.seen, time, m)
+        found = path_command(m, self.path, pose, state.length, self.path.speed, dt, self.gains)
+        if found is None:
+            return replace(state, mode="done", outcome=ARRIVED, length=self.path.length), STOP
+        speed, omega, length, bounded = found
+        ux, uy = point_velocity(
+            float(pose[2]) + m.heading,
+            speed,
+            omega,
+            float(m.arm[0]),
+            float(m.arm[1]),
+            float(pose[2]),
+            dt,
+            RAMP,
+        )
+        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega * dt
+        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
+        slow = min(1.0, self.fastest / max(float(np.hypot(ux, uy)), 1e-300))
+        velocity = slow * np.array([ux, uy, omega if m.turns else 0.0])
+        if not np.all(np.isfinite(velocity)):
+            return replace(state, mode="done", outcome="the law gave no finite command"), STOP
+        mode, note = ("saturated", "at the edge of the friction cone") if bounded else ("path", "")
+        return replace(
+            state, mode=mode, note=note, length=length, seen=with_command(state.seen, time, velocity)
+        ), Command(velocity)

@@ -1,0 +1,143 @@
+"""Many closed-loop runs of one push at once, compiled: a point finger on an ellipsoidal limit surface.
+
+For other surfaces, round fingers and cameras that are late, see control.closed_loop.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import InputError
+from ...geometry.pose import Array
+from ..gains import HOLDS
+from ..linearisation import TrackingController
+from ..path_following import PathController
+from ..reference import PathReference
+
+OUTCOMES = ("out of time", "left the edge", "arrived")
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoopRuns:
+    """n runs.
+
+    Attributes:
+        final: X_WO at the end, shape (n, 3).
+        worst: largest distance of the flat point from its reference (path: across it), as measured, shape (n,) [m].
+        stuck: ticks in which the finger stuck, shape (n,).
+        slid: how far the contact moved along its edge, + to the left, shape (n,) [m].
+        outcome: codes, shape (n,); OUTCOMES[code] is the word.
+        object: X_WO before every tick and at the end, shape (n, ticks + 1, 3), if it was recorded; else None.
+    """
+
+    final: Array
+    worst: Array
+    stuck: Any
+    slid: Array
+    outcome: Any
+    object: Array | None = None
+
+
+def closed_loops(
+    controller: TrackingController | PathController,
+    normal: ArrayLike,
+    starts: ArrayLike,
+    surfaces: ArrayLike,
+    duration: float,
+    *,
+    cofs: ArrayLike = (0.0, 0.0),
+    friction: ArrayLike = 1.0,
+    edge: float = np.inf,
+    noise: tuple[float, float] = (0.0, 0.0),
+    seed: int = 0,
+    record: bool = False,
+    threads: int | None = None,
+) -> ClosedLoopRuns:
+    """Runs a controller of a path reference from n poses X_WO (n, 3).
+
+    Args:
+        normal: inward, at the model's contact, in O (2,).
+        surfaces: matrices A of limit surfaces about the centre of friction, (3, 3) or (n, 3, 3).
+        cofs: centres of friction in O, (2,) or (n, 2). friction: () or (n,).
+        edge: the contact leaves its edge after sliding this far [m].
+        noise: standard deviations of the measured pose in every tick [m, rad]. seed: of it.
+        record: keeps every pose.
+
+    Raises:
+        InputError: for shapes or numbers that make no sense.
+    """
+    from .kernels import many
+
+    model = controller.model
+    dfl = isinstance(controller, TrackingController)
+    path = controller.reference if isinstance(controller, TrackingController) else controller.path
+    if not isinstance(path, PathReference):
+        raise InputError("compiled runs follow a path reference", value=type(path).__name__)
+    objects = np.ascontiguousarray(np.array(starts, dtype=float))
+    if objects.ndim != 2 or objects.shape[1] != 3 or not np.all(np.isfinite(objects)):
+        raise InputError("starts are poses, shape (n, 3)", value=np.shape(starts))
+    n = len(objects)
+    A = np.ascontiguousarray(np.array(surfaces, dtype=float).reshape(-1, 3, 3))
+    centres = np.ascontiguousarray(np.array(cofs, dtype=float).reshape(-1, 2))
+    mus = np.atleast_1d(np.array(friction, dtype=float))
+    for name, values in (("surfaces", A), ("cofs", centres), ("friction", mus)):
+        if len(values) not in (1, n) or not np.all(np.isfinite(values)):
+            raise InputError(f"{name}: one for all or one for each of {n} runs", value=len(values))
+    if np.any(np.linalg.eigvalsh(A) <= 0):
+        raise InputError("a limit surface is a positive-definite matrix", key="surfaces")
+    if not (np.isfinite(duration) and duration > 0):
+        raise InputError("a duration is positive and finite", key="duration", value=duration)
+    n_O = np.array(normal, dtype=float)
+    if n_O.shape != (2,) or not np.all(np.isfinite(n_O)) or float(np.hypot(*n_O)) == 0:
+        raise InputError("a normal is a vector of the plane", key="normal", value=normal)
+    n_O = n_O / np.hypot(*n_O)
+    row = np.array([*model.flat_point, model.heading, model.left, model.right, *model.contact, *n_O])
+    gains = (
+        np.array([*controller.gains.kp, *controller.gains.kd])
+        if isinstance(controller, TrackingController)
+        else np.array([*controller.gains, 0.0, 0.0])
+    )
+    hold = HOLDS.index(controller.hold) if isinstance(controller, TrackingController) else 0
+    ticks = round(duration * controller.rate)
+    noises = np.zeros((1, 1, 3))
+    if max(noise) > 0:
+        size = np.array([noise[0], noise[0], noise[1]])
+        noises = np.random.default_rng(seed).standard_normal((n, ticks, 3)) * size
+    ways = np.full((n, ticks + 1 if record else 0, 3), np.nan)
+    out = np.empty((n, 7))
+    args = (
+        0 if dfl else 1,
+        hold,
+        np.ascontiguousarray(path.table),
+        float(path.speed),
+        row,
+        gains,
+        float(controller.rate),
+        ticks,
+        objects,
+        A,
+        centres,
+        mus,
+        float(edge),
+        noises,
+        ways,
+        out,
+    )
+    workers = threads or os.cpu_count() or 1
+    size_ = max(1, -(-n // (4 * workers)))
+    if n:
+        many(0, min(size_, n), *args)  # compiles, if need be, in one thread
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(lambda k: many(k, min(k + size_, n), *args), range(size_, n, size_)))
+    return ClosedLoopRuns(
+        out[:, :3],
+        out[:, 3],
+        out[:, 4].astype(int),
+        out[:, 5],
+        out[:, 6].astype(int),
+        ways if record else None,
+    )

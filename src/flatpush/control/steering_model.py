@@ -1,0 +1,192 @@
+"""What a controller knows of a push that sticks: its flat point, its heading and how tightly it turns."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..geometry import cross, perpendicular, rotate, shift_twist, velocity_at
+from ..geometry.pose import Array
+from ..steering.car import Car
+from ..steering.flat import FlatOutput
+from .learning import SteeringEstimate
+
+# Turns per length at which the drift is computed, and halvings of the force's angle for each.
+_SAMPLES, _HALVINGS = 21, 40
+
+
+@dataclass(frozen=True, eq=False)
+class SteeringModel:
+    """A push as its flat output, in the object frame O. Build with of_car, of_flat, or about() an estimate.
+
+    A finger that sticks makes the flat point run at s > 0 along the heading while the object turns at any ω within
+    -right ≤ ω/s ≤ left; what the pusher must do for that is the rigid motion of its place on the object.
+
+    Attributes:
+        flat_point: shape (2,) [m].
+        heading: from O's +x to the way the flat point moves [rad].
+        left, right: most turn per length to either side, what the friction cone allows [1/m].
+        contact: the contact point, shape (2,).
+        pusher: X_OE while it sticks, shape (3,).
+        turns: whether the pusher turns with the object; if not, its round finger rolls on it.
+        drift: how far the flat point moves to its left, per length along the heading, at turns per length evenly from
+            -right to left, shape (n,): zero for an ellipsoidal limit surface, on which flatness is exact.
+    """
+
+    flat_point: Array
+    heading: float
+    left: float
+    right: float
+    contact: Array
+    pusher: Array
+    turns: bool = True
+    drift: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name, size in (("flat_point", 2), ("contact", 2), ("pusher", 3)):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != (size,) or not np.all(np.isfinite(value)):
+                raise InputError(f"{size} finite numbers are needed", key=name, value=getattr(self, name))
+            object.__setattr__(self, name, value)
+        if not (np.isfinite(self.heading) and 0 < self.left < np.inf and 0 < self.right < np.inf):
+            raise InputError(
+                "a model has a finite heading and turns to both sides",
+                value=(self.heading, self.left, self.right),
+            )
+        d = self.flat_point - self.contact
+        if float(d @ self.direction) <= 0:
+            raise InputError("the flat point lies ahead of the contact", value=self.flat_point)
+
+    @classmethod
+    def of_car(cls, car: Car, turns: bool = True, whole: Car | None = None) -> "SteeringModel":
+        """Of a car; its flat point is the midpoint of the turning centres, and its heading is across them.
+
+        Args:
+            whole: the car of the same push without a margin, whose turns are the limits; default: the car itself.
+        """
+        span = car.left_centre - car.right_centre
+        across = -perpendicular(span)
+        angle = float(np.arctan2(across[1], across[0]))
+        full = car if whole is None else whole
+        h = np.array([np.cos(angle), np.sin(angle)])
+        n = perpendicular(h)
+        left, right = (
+            float((full.left_centre - car.flat_point) @ n),
+            float((car.flat_point - full.right_centre) @ n),
+        )
+        edge = 1 - 1e-6  # the edges themselves belong to sliding
+        kappas = np.linspace(-edge / right, edge / left, _SAMPLES)
+        drift = np.zeros(_SAMPLES)
+        for k, kappa in enumerate(kappas):
+            # Twists of the whole car, per length of its own flat point; of ours, along our heading.
+            v = velocity_at(_twist(full, car.flat_point, h, float(kappa)), car.flat_point)
+            drift[k] = float(v @ n) / float(v @ h)
+        contact = car.contact.point + car.cof
+        return cls(car.flat_point, angle, edge / left, edge / right, contact, car.pusher, turns, drift)
+
+    @classmethod
+    def of_flat(
+        cls, flat: FlatOutput, pusher: ArrayLike | None = None, turns: bool = True
+    ) -> "SteeringModel":
+        """Of a flat output; the contact's frame is O, or the pusher stands at the contact."""
+        p, n = flat.contact.point, flat.contact.normal
+        stands = np.array([*p, np.arctan2(n[1], n[0])]) if pusher is None else pusher
+        left, right = flat.along - flat.c_right, flat.c_left - flat.along
+        return cls(
+            flat.flat_point, flat.heading_offset, 1 / left, 1 / right, p, np.asarray(stands, float), turns
+        )
+
+    @property
+    def direction(self) -> Array:
+        """h in O, shape (2,)."""
+        return np.array([np.cos(self.heading), np.sin(self.heading)])
+
+    @property
+    def arm(self) -> Array:
+        """From the flat point to what the pusher moves: its own origin, or the contact where it rolls; in O (2,)."""
+        return (self.pusher[:2] if self.turns else self.contact) - self.flat_point
+
+    def about(self, estimate: SteeringEstimate) -> "SteeringModel":
+        """The same push by an estimate in O: the flat point moves to the new axle, ahead of the contact as before."""
+        axle = estimate.axle(self.contact)
+        h = axle.heading
+        c = float(cross(self.flat_point - self.contact, self.direction))  # to the right
+        point = self.contact + axle.offset * h - c * perpendicular(h)
+        return replace(self, flat_point=point, heading=float(np.arctan2(h[1], h[0])))
+
+    @cached_property
+    def _numbers(self) -> tuple[float, ...]:
+        """h, the arm and the flat point as plain numbers: a control step is made of few of numpy's."""
+        h, r, z = self.direction, self.arm, self.flat_point
+        return float(h[0]), float(h[1]), float(r[0]), float(r[1]), float(z[0]), float(z[1])
+
+    def motion(self, ux: float, uy: float) -> tuple[float, float]:
+        """Flat speed and ω of the object under a velocity in O of the pusher (where it turns) or contact."""
+        hx, hy, rx, ry, _, _ = self._numbers
+        across = 0.0
+        for _ in range(1 if self.drift is None else 3):
+            vx, vy = ux + across * hy, uy - across * hx
+            omega = (hx * vy - hy * vx) / (hx * rx + hy * ry)
+            speed = (vx + omega * ry) * hx + (vy - omega * rx) * hy
+            across = self.across(speed, omega)
+        return speed, omega
+
+    def moved(
+        self, x: float, y: float, turn: float, ux: float, uy: float, dt: float
+    ) -> tuple[float, float, float]:
+        """X_WO after a time in which the pusher goes straight with a velocity in W and the contact sticks."""
+        hx, hy, _, _, zx, zy = self._numbers
+        middle, speed, omega = turn, 0.0, 0.0
+        for _ in range(2):  # the second time with the heading of the middle of the stretch
+            c, d = math.cos(middle), math.sin(middle)
+            speed, omega = self.motion(c * ux + d * uy, c * uy - d * ux)
+            middle = turn + 0.5 * omega * dt
+        # The flat point's chord, then O about it.
+        half = 0.5 * omega * dt
+        chord = dt * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+        across = self.across(speed, omega)
+        vx, vy = chord * (speed * hx - across * hy), chord * (speed * hy + across * hx)
+        c, d = math.cos(middle), math.sin(middle)
+        px, py = c * vx - d * vy, d * vx + c * vy
+        c, d = math.cos(turn), math.sin(turn)
+        px, py, turn = px + c * zx - d * zy, py + d * zx + c * zy, turn + omega * dt
+        c, d = math.cos(turn), math.sin(turn)
+        return x + px - c * zx + d * zy, y + py - d * zx - c * zy, turn
+
+    def across(self, speed: float, omega: float) -> float:
+        """Speed of the flat point to its left, of a flat speed and ω [m/s]; see drift."""
+        if self.drift is None or speed <= 0:
+            return 0.0
+        place = (omega / speed + self.right) / (self.left + self.right) * (len(self.drift) - 1)
+        place = min(max(place, 0.0), len(self.drift) - 1.000001)
+        k = int(place)
+        d = self.drift
+        return speed * float(d[k] + (place - k) * (d[k + 1] - d[k]))
+
+    def twist(self, speed: float, omega: float) -> Array:
+        """Body twist in O for a flat speed and ω, shape (3,)."""
+        h = self.direction
+        v = speed * h + self.across(speed, omega) * perpendicular(h)
+        return np.array([*(v - omega * perpendicular(self.flat_point)), omega])
+
+    def flat_of(self, pose: ArrayLike) -> tuple[float, float, float]:
+        """Flat point x, y and heading in W at a pose X_WO."""
+        x, y, turn = (float(v) for v in np.asarray(pose, dtype=float))
+        _, _, _, _, zx, zy = self._numbers
+        c, d = math.cos(turn), math.sin(turn)
+        return x + c * zx - d * zy, y + d * zx + c * zy, turn + self.heading
+
+
+def _twist(car: Car, point: Array, h: Array, kappa: float) -> Array:
+    """The sticking twist in O whose turn, per length of a point along h, is kappa; by halving the force's angle."""
+    left, _, right = car.contact.force_angles(car.forces)
+    V = np.zeros(3)
+    for _ in range(_HALVINGS):
+        angle = 0.5 * (left + right)
+        V = shift_twist(car.surface.twist(car.contact.wrench(rotate(angle, car.contact.normal))), -car.cof)
+        turn = float(V[2]) / float(velocity_at(V, point) @ h)
+        left, right = (angle, right) if turn < kappa else (left, angle)
+    return V

@@ -1,0 +1,99 @@
+"""flatpush track, as a user runs it."""
+
+import json
+
+import numpy as np
+import pytest
+from tests.conftest import RECTANGLE
+from tests.unit.test_control import PERFECT
+
+import flatpush as fp
+from flatpush.cli.app import app
+from flatpush.control import Measurement, SimulatedSensor
+from flatpush.control.closed_loop import drive
+from flatpush.control.plan_controller import PlanController, goal_error
+from flatpush.simulation.plant import Plant
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    thing = fp.Object(RECTANGLE, friction=0.4, name="rectangle")
+    found = fp.plan(fp.Scene(thing, (-0.04, -0.12, 0.5)))
+    path = tmp_path_factory.mktemp("track") / "plan.json"
+    found.save(path)
+    return found, path
+
+
+def call(*arguments):
+    return app([str(a) for a in arguments], standalone_mode=False)
+
+
+@pytest.mark.parametrize("law", ["path", "dfl"])
+def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
+    _, path = plan
+    figure = tmp_path / "run.svg"
+    perfect = ("--rate", 60, "--noise", "0,0", "--latency", 0)
+    assert call("track", path, "--controller", law, *perfect, "--figure", figure) == 0
+    text = capsys.readouterr().out
+    assert "arrived" in text
+    assert "sticking" in text
+    assert figure.read_bytes().lstrip().startswith(b"<")
+    assert call("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json") == 0
+    first = json.loads(capsys.readouterr().out)
+    assert call("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json") == 0
+    assert json.loads(capsys.readouterr().out) == first
+    assert first["outcome"] == "arrived"
+
+
+def test_what_makes_no_sense_is_refused(plan):
+    _, path = plan
+    for option, value, rule in (
+        ("--rate", "0", "rate is positive"),
+        ("--controller", "pid", "path, dfl, horizon"),
+        ("--noise", "-1,0", "0 or more"),
+        ("--camera", "0", "camera is positive"),
+        ("--friction", "-0.1", "0 or more"),
+        ("--figure", "run.gif", "ends in"),
+    ):
+        with pytest.raises(fp.InputError, match=rule):
+            call("track", path, option, value)
+    with pytest.raises(fp.InputError, match="at 10 Hz no k_d makes"):
+        call("track", path, "--controller", "dfl", "--rate", "10", "--frequency", "30")
+
+
+def drives(plan, law, start, **options):
+    controller = PlanController.of(plan, law, **options)
+    first = plan.pushes[0]
+    plant = Plant(plan.scene.object, first.fingers, plan.scene.pusher.tip_radius)
+    hand = first.pusher[0] - np.array([0.0, 0.03, 0.0])
+    sensor = SimulatedSensor(PERFECT, np.random.default_rng(0))
+    return drive(controller, plant, start, hand, sensor, 3 * plan.duration)
+
+
+def test_what_the_path_law_follows_exactly_ends_at_the_goal(plan):
+    """On the exact surface of the support, where flatness is not exact: the drift of the flat point is made up for."""
+    run = drives(plan[0], "path", plan[0].scene.start_pose)
+    distance, turn = goal_error(plan[0], run.object[-1])
+    assert run.outcome == "arrived"
+    assert distance < 5e-5
+    assert np.rad2deg(turn) < 0.05
+
+
+def test_feedback_brings_back_what_grows_without_it(plan):
+    start = plan[0].scene.start_pose + np.array([0.0005, -0.0005, np.deg2rad(0.5)])
+    run = drives(plan[0], "path", start)
+    assert run.outcome == "arrived"
+    distance, turn = goal_error(plan[0], run.object[-1])
+    assert distance < 0.002
+    assert np.rad2deg(turn) < 2
+
+
+def test_a_bad_frame_on_the_way_to_the_object_stops_the_pusher(plan):
+    controller = PlanController.of(plan[0], "path")
+    state = controller.start()
+    frame = Measurement(0.0, np.array([np.nan, 0, 0]), np.zeros(3))
+    held, command = controller.step(state, frame, 0.0)
+    assert held.mode == "held"
+    assert not command.velocity.any()
+    with pytest.raises(fp.InputError, match="no push to follow"):
+        PlanController.of(fp.Plan("no_plan", plan[0].scene))

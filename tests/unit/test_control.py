@@ -1,0 +1,244 @@
+"""Feedback on a sticking push: references, linearisation, path law, and what they do with bad input."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.control import Camera, Measurement, SimulatedSensor
+from flatpush.control.closed_loop import drive
+from flatpush.control.gains import HOLDS, Gains, limits
+from flatpush.control.linearisation import PostureController, TrackingController
+from flatpush.control.path_following import PathController
+from flatpush.control.reference import AbstractReference, FlatState, PathReference, check_reference
+from flatpush.control.steering_model import SteeringModel
+from flatpush.friction import Ellipsoid
+from flatpush.geometry import compose, pose_error, transform
+from flatpush.simulation.plant import Plant
+
+UNIT = 0.02  # the paper's normalising length [m]
+NOMINAL = np.diag([1.0537, 1.0537, 1.5087 / UNIT**2])
+SQUARE = [(-UNIT, -UNIT), (UNIT, -UNIT), (UNIT, UNIT), (-UNIT, UNIT)]
+PERFECT = Camera(rate=1e6, latency=0, position=0, angle=0)
+
+
+def square_push(surface=NOMINAL, friction=1.0):
+    """The paper's square pushed upwards in the middle of its lower side: the model of NOMINAL, the plant of surface."""
+    thing = fp.Object(SQUARE, friction=friction, surface=Ellipsoid(surface))
+    plant = Plant(thing, [[0.0, 0.0]], 0.0, surface=Ellipsoid(surface), cof=[0.0, 0.0])
+    flat = fp.flat_output(fp.PointContact([0, -UNIT], [0, 1], 0.7), Ellipsoid(NOMINAL))
+    return plant, SteeringModel.of_flat(flat)
+
+
+def run(controller, plant, start, duration, camera=PERFECT, seed=0):
+    model = controller.model
+    sensor = SimulatedSensor(camera, np.random.default_rng(seed))
+    return drive(controller, plant, start, compose(start, model.pusher), sensor, duration)
+
+
+def test_references_of_a_plan_are_exact(one_finger_plan):
+    """z_d agrees with the plan's poses, its derivatives with differences, and z is C¹ at junctions."""
+    (segment, *_) = one_finger_plan.pushes
+    from flatpush.planning.options import push_option
+    from flatpush.problem.mechanics import named
+
+    car = push_option(one_finger_plan.scene, named(one_finger_plan.scene, segment.push)).car
+    model = SteeringModel.of_car(car)
+    path = PathReference.of_push(segment, model)
+    z = transform(segment.object, model.flat_point)
+    # Every sample lies on the path, and the last at its end.
+    ends = [path.at(0).position, path.at(path.duration).position]
+    np.testing.assert_allclose(ends, z[[0, -1]], atol=1e-9)
+    for t in np.linspace(0.01, 0.99, 23) * path.duration:
+        h = 1e-5
+        before, now, after = path.at(t - h), path.at(t), path.at(t + h)
+        if np.allclose(before.acceleration, after.acceleration, atol=1e-3 * path.speed):
+            np.testing.assert_allclose((after.position - before.position) / (2 * h), now.velocity, atol=1e-8)
+            np.testing.assert_allclose(
+                (after.velocity - before.velocity) / (2 * h), now.acceleration, atol=1e-7
+            )
+    check_reference(path)
+
+
+def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():
+    """z̈ = w for an asymmetric contact (c ≠ 0): the mean over a small tick of what the flat point does is w."""
+    from flatpush.control.laws.plain import AFTER, linearised, point_velocity
+
+    flat = fp.flat_output(fp.PointContact([0.006, -0.02], [0.1, 0.995], 0.6), Ellipsoid(NOMINAL))
+    assert abs(flat.along) > 1e-3
+    model = SteeringModel.of_flat(flat)
+    theta, s, dt = 0.4, 0.02, 1e-5
+    x, y, heading = model.flat_of([0.1, 0.2, theta])
+    w = np.array([0.003, -0.002])
+    after, out, omega, scale, bounded = linearised(
+        x, y, heading, s, x, y, s * np.cos(heading), s * np.sin(heading), *w, 4, 4, 4, 4,
+        model.left, model.right, 1e-3, 1, dt, AFTER,
+    )  # fmt: skip
+    assert scale == 1
+    assert not bounded
+    h = np.array([np.cos(heading), np.sin(heading)])
+    turned = np.array([np.cos(heading + omega * dt), np.sin(heading + omega * dt)])
+    np.testing.assert_allclose((after * turned - s * h) / dt, w, rtol=1e-3, atol=1e-7)
+    # And the pusher's velocity is that of the contact: the force that it needs lies in V = A Jᵀ f.
+    u = point_velocity(heading, out, omega, *model.arm, theta, dt, AFTER)
+    c, d = np.cos(theta), np.sin(theta)
+    u_O = np.array([c * u[0] + d * u[1], c * u[1] - d * u[0]])
+    motion = flat.contact.motion(Ellipsoid(NOMINAL), u_O)
+    assert motion.mode == fp.ContactMode.STICKING
+    np.testing.assert_allclose(motion.twist, model.twist(out, omega), atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [10, 60, 1000])
+def test_the_nominal_push_ends_on_the_reference(rate):
+    """The paper's start error, kp = kd = 4: within 0.01 mm and 0.01° after 30 s, on an arc and at any rate."""
+    plant, model = square_push()
+    bend = 10.0
+    x, y, heading = model.flat_of([0, 0, 0])
+    speed, T = 0.0077, 30.0 if rate < 1000 else 12.0
+    path = PathReference(np.array([[0.0, speed * 31, x, y, heading, bend]]), speed)
+    controller = TrackingController(model, Gains(4.0, 4.0), rate, reference=path)
+    found = run(controller, plant, np.array([-0.001, -0.0025, np.deg2rad(3.6)]), T)
+    assert found.outcome == "out of time"
+    assert set(found.contacts[1:]) == {"sticking"}
+    state = path.at(float(found.times[-1]))
+    off = np.hypot(*(transform(found.object[-1], model.flat_point) - state.position))
+    turn = model.flat_of(found.object[-1])[2] - np.arctan2(state.velocity[1], state.velocity[0])
+    assert off < 1e-5
+    assert abs(np.rad2deg(np.remainder(turn + np.pi, 2 * np.pi) - np.pi)) < 0.01
+
+
+@pytest.mark.parametrize("hold", HOLDS)
+def test_gains_beyond_the_limit_of_a_rate_are_refused_and_would_diverge(hold):
+    for kp in (0.5, 4.0, 100.0):
+        low, high = limits(kp, 60.0, hold)
+        Gains(kp, 0.5 * (low + high)).check(60.0, hold)
+        for kd in (high * 1.001, low * 0.999):
+            if kd > 0:
+                with pytest.raises(fp.InputError, match="stable with a k_d between"):
+                    Gains(kp, kd).check(60.0, hold)
+        dt = 1 / 60
+        for kd, stable in ((high * 0.99, True), (high * 1.01, False), (max(low * 1.01, 0.01), True)):
+            A = {
+                "ramp": [[1 - kp * dt**2 / 2, dt - kd * dt**2 / 2], [-kp * dt, 1 - kd * dt]],
+                "after": [[1, dt], [-kp * dt, 1 - kd * dt]],
+                "before": [[1 - kp * dt**2, dt - kd * dt**2], [-kp * dt, 1 - kd * dt]],
+            }[hold]
+            assert (np.abs(np.linalg.eigvals(np.array(A))).max() < 1) == stable
+
+
+@dataclass(frozen=True)
+class Swing(AbstractReference):
+    """Along y, there and back (or to a rest on the way and on)."""
+
+    back: bool
+    duration: float = 10.0
+
+    def at(self, time):
+        w = 2 * np.pi / self.duration
+        v = np.cos(w * time) if self.back else 1 + np.cos(w * time)
+        a = -w * np.sin(w * time)
+        z = np.sin(w * time) / w + (0 if self.back else time)
+        return FlatState(np.array([0, 0.01 * z]), np.array([0, 0.01 * v]), np.array([0, 0.01 * a]))
+
+
+def test_references_that_rest_or_reverse_are_refused():
+    _, model = square_push()
+    for back in (True, False):
+        with pytest.raises(fp.InputError, match=r"reverses|vanishes"):
+            TrackingController(model, Gains(4, 4), reference=Swing(back))
+    tight = PathReference(np.array([[0, 0.1, 0, 0, 0, 2 * model.left]]), 0.02)
+    with pytest.raises(fp.InputError, match="friction cone"):
+        TrackingController(model, Gains(4, 4), reference=tight)
+    for rate in (0.0, -5.0, np.nan):
+        with pytest.raises(fp.InputError, match="rate is positive"):
+            TrackingController(model, Gains(4, 4), rate, reference=Swing(True))
+        with pytest.raises(fp.InputError, match="rate is positive"):
+            PathController(model, tight, rate)
+    with pytest.raises(fp.InputError, match="positive"):
+        PathReference(tight.table, 0.0)
+    with pytest.raises(fp.InputError, match="stable with a damping"):
+        PathController(model, PathReference(tight.table, 0.5), 5.0)
+
+
+def controllers():
+    _, model = square_push()
+    x, y, heading = model.flat_of([0, 0, 0])
+    path = PathReference.straight([x, y], heading, 0.1, 0.02)
+    return {
+        "dfl": TrackingController(model, Gains(4, 4), reference=path, body="square"),
+        "path": PathController(model, path, body="square"),
+        "posture": PostureController(model, Gains([1, 4], [2, 4]), goal=[0, 0.1, 0], body="square"),
+    }
+
+
+@pytest.mark.parametrize("name", ["dfl", "path", "posture"])
+def test_bad_measurements_stop_the_pusher_and_good_ones_start_it_again(name):
+    controller = controllers()[name]
+    good = [0.0, 0.0, 0.0], [0.0, -0.02, np.pi / 2]
+    state, command = controller.step(controller.start(), None, 0.0)
+    assert state.mode == "waiting"
+    assert not command.velocity.any()
+    state, command = controller.step(state, Measurement(0.01, *map(np.array, good)), 0.02)
+    assert command.velocity[1] > 0
+    bad = {
+        "finite": Measurement(0.02, np.array([np.nan, 0, 0]), np.array(good[1])),
+        "not finite": Measurement(0.02, np.array(good[0]), np.array([0, np.inf, 0])),
+        "no newer": Measurement(0.01, *map(np.array, good)),
+        "another object": Measurement(0.02, *map(np.array, good), body="disc"),
+        "ahead of now": Measurement(7.0, *map(np.array, good)),
+    }
+    for reason, frame in bad.items():
+        held, command = controller.step(state, frame, 0.03)
+        assert held.mode == "held"
+        assert reason in held.note
+        assert not command.velocity.any()
+        again, command = controller.step(held, Measurement(0.04, *map(np.array, good)), 0.04)
+        assert again.outcome == ""
+        assert command.velocity[1] > 0
+    old, command = controller.step(state, None, 5.0)
+    assert old.mode == "waiting"
+    assert not command.velocity.any()
+    odd, command = controller.step(state, None, float("nan"))
+    assert odd.mode == "held"
+    assert not command.velocity.any()
+
+
+@pytest.mark.parametrize("name", ["dfl", "path", "posture"])
+def test_commands_are_finite_wherever_the_object_is(name):
+    controller = controllers()[name]
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        pose = rng.normal(size=3) * [1e3, 1e3, 10] * 10 ** rng.uniform(-6, 0)
+        frame = Measurement(0.0, pose, compose(pose, controller.model.pusher))
+        _, command = controller.step(controller.start(), frame, 0.0)
+        assert np.all(np.isfinite(command.velocity))
+
+
+@pytest.mark.parametrize("law", ["dfl", "path"])
+def test_a_late_camera_is_made_up_for_by_prediction(law):
+    """100 ms of latency, no noise, exact model: as good as without latency, within a part of the start error."""
+    plant, model = square_push()
+    x, y, heading = model.flat_of([0, 0, 0])
+    path = PathReference.straight([x, y], heading, 0.15, 0.02)
+    for latency in (0.0, 0.1):
+        controller = (
+            TrackingController(model, Gains(4, 4), reference=path)
+            if law == "dfl"
+            else PathController(model, path)
+        )
+        camera = Camera(rate=30, latency=latency, position=0, angle=0)
+        found = run(controller, plant, np.array([-0.001, 0.0, 0.02]), 20, camera)
+        assert found.outcome == "arrived"
+        error = pose_error(found.object[-1], [0, 0.15, 0])
+        assert np.hypot(error[0], error[1]) < 2e-4
+        assert abs(error[2]) < 0.02
+
+
+def test_the_posture_law_arrives_along_the_goal():
+    plant, model = square_push()
+    controller = PostureController(
+        model, Gains([0.5, 2.0], [1.6, 3.0]), goal=[0.0, 0.1, 0.0], tolerance=(0.002, np.deg2rad(3))
+    )
+    found = run(controller, plant, np.array([-0.002, 0.0, 0.05]), 60)
+    assert found.outcome == "arrived"
