@@ -188,6 +188,25 @@ def test_interrupting_leaves_no_file(folder):
     assert sorted(p.name for p in folder.iterdir()) == before
 
 
+@pytest.mark.slow
+def test_interrupting_a_search_among_obstacles_keeps_the_best_plan(folder):
+    maze = (
+        (ROOT / "examples" / "maze.yaml")
+        .read_text(encoding="utf-8")
+        .replace("time_limit: 2", "time_limit: 600")
+    )
+    (folder / "maze.yaml").write_text(maze.replace("planning: {", "planning: {iterations: 1000000, "))
+    flatpush("plan", "maze.yaml", "--time-limit", "0.01", folder=folder)  # compiles, if need be
+    command = [sys.executable, "-m", "flatpush", "plan", "maze.yaml", "-o", "plan.json"]
+    running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    time.sleep(15)
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=120)
+    assert running.returncode == 0, errors
+    assert "best plan found so far" in errors
+    assert flatpush("verify", "plan.json", folder=folder).returncode == 0
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_plans_and_verifies(example, tmp_path):
     made = flatpush("plan", example, "-o", "plan.json", folder=tmp_path)

@@ -1,6 +1,7 @@
 """flatpush plan: plans, verifies, writes."""
 
 import math
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +25,6 @@ def command(
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
     from ..documents import check_writable, load_scene, plan_document, save_plan
-    from ..planning import Planner
     from ..simulation import verify
 
     overrides: dict[str, Any] = {
@@ -49,8 +49,7 @@ def command(
         from ..view import check_figure
 
         check_figure(figure)
-    with telling("planning (the first run compiles for some seconds)"):
-        found = Planner(asked, tree or False).plan()
+    found = _planned(asked, tree)
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))
@@ -77,6 +76,39 @@ def command(
         return 0
     _tell(found, output, figure)
     return 0
+
+
+def _planned(scene: Any, tree: Path | None) -> Any:
+    """The best plan found. Ctrl-C ends the search; what has been found by then is kept.
+
+    Among obstacles a line on a terminal shows how far the search is.
+    """
+    from ..planning import Planner
+
+    live, shown, best = sys.stderr.isatty(), 0.0, None
+
+    def progress(cost: float, clock: float, poses: int) -> None:
+        nonlocal shown
+        if clock - shown < 0.2:
+            return
+        shown = clock
+        so_far = "no way yet" if math.isinf(cost) else f"best so far {cost_text(cost, scene.planning.cost)}"
+        sys.stderr.write(f"\r{clock:5.1f} s: {so_far}, {poses} poses searched" + 12 * " ")
+        sys.stderr.flush()
+
+    try:
+        with telling("planning (the first run compiles for some seconds)"):
+            for answer in Planner(scene, tree or False, progress if live else None).answers():
+                best = answer
+    except KeyboardInterrupt:
+        if best is None or math.isinf(best.cost):
+            raise
+        typer.echo("stopped: this is the best plan found so far", err=True)
+    finally:
+        if shown > 0:
+            sys.stderr.write("\n")
+    assert best is not None  # there is always an answer
+    return best.plan()
 
 
 def _tell(plan: Any, output: Path | None, figure: Path | None) -> None:
