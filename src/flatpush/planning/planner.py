@@ -22,6 +22,7 @@ from .assembly import Leg, Segments, assemble, car_of, costs, words_of
 from .candidates import automatic_pushes
 from .fleets import fleet_of
 from .freedom import Freedom, freedom
+from .obstacles import check_ends
 from .options import PushOption, push_options
 from .transits import Transits
 
@@ -101,9 +102,14 @@ class Planner:
         """Better and better answers, each as soon as it is found and certified only when its plan is called for.
 
         There is always one; where there is no plan, its cost is infinite. The search may be left at any answer.
+
+        Raises:
+            InputError: if the object cannot be at the start or at the goal, among what is in the way there.
         """
         began = time.perf_counter()
         scene = self.scene if start is None else replace(self.scene, start=start)
+        if _crowded(scene):
+            check_ends(scene)
         if np.all(np.abs(pose_error(scene.start, scene.goal)) <= scene.planning.goal_tolerance):
             yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return

@@ -6,8 +6,9 @@ Whether a motion keeps the clearance is decided exactly, between its ends includ
 """
 
 from .asked import careful, legs_of, obstructions, task_of, way_of
+from .ends import check_ends
 from .path import Way
 from .search import Search
 from .task import Task
 
-__all__ = ["Search", "Task", "Way", "careful", "legs_of", "obstructions", "task_of", "way_of"]
+__all__ = ["Search", "Task", "Way", "careful", "check_ends", "legs_of", "obstructions", "task_of", "way_of"]
