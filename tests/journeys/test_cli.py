@@ -1,7 +1,6 @@
 """The command line, as a user meets it."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -25,6 +24,19 @@ goal: [0, 0, 0]
 def flatpush(*arguments, folder, **options) -> subprocess.CompletedProcess:
     command = [sys.executable, "-m", "flatpush", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, **options)
+
+
+def interrupted(command, folder, seconds):
+    """How a command ends after Ctrl-C, so long after its start: status and what it said on stderr."""
+    with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as running:
+        time.sleep(seconds)
+        running.send_signal(signal.SIGINT)
+        try:
+            _, errors = running.communicate(timeout=120)
+        except subprocess.TimeoutExpired:
+            running.kill()
+            raise
+    return running.returncode, errors
 
 
 @pytest.fixture
@@ -179,11 +191,8 @@ def test_interrupting_leaves_no_file(folder):
         "-o",
         "runs.json",
     ]
-    running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-    time.sleep(3)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=60)
-    assert running.returncode == 130
+    ended, errors = interrupted(command, folder, 3)
+    assert ended == 130
     assert "Traceback" not in errors
     assert sorted(p.name for p in folder.iterdir()) == before
 
@@ -198,11 +207,8 @@ def test_interrupting_a_search_among_obstacles_keeps_the_best_plan(folder):
     (folder / "maze.yaml").write_text(maze.replace("planning: {", "planning: {iterations: 1000000, "))
     flatpush("plan", "maze.yaml", "--time-limit", "0.01", folder=folder)  # compiles, if need be
     command = [sys.executable, "-m", "flatpush", "plan", "maze.yaml", "-o", "plan.json"]
-    running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-    time.sleep(15)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=120)
-    assert running.returncode == 0, errors
+    ended, errors = interrupted(command, folder, 15)
+    assert ended == 0, errors
     assert "best plan found so far" in errors
     assert flatpush("verify", "plan.json", folder=folder).returncode == 0
 

@@ -1,19 +1,24 @@
 """What holds for every quasi-static push: no overlap, symmetry, no preferred frame, no time."""
 
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 import flatpush as fp
-from flatpush.geometry import compose, wrap_angle
-from flatpush.simulation.plant import Plant
+from flatpush.contact import PointContact
+from flatpush.geometry import compose, inverse, log, shift_twist, transform, velocity_at, wrap_angle
+from flatpush.simulation.plant import MODES, Plant
+from flatpush.simulation.plant.plain import facing
 
 HOOK = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.04), (0.04, 0.04), (0.04, 0.02), (0.0, 0.02)]
 TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
 SHAPES = {"convex": TRIANGLE, "concave": HOOK, "circle": None}
 TIPS = {1: np.array([[0.0, 0.0]]), 2: np.array([[0.0, 0.009], [0.0, -0.009]])}
 MIRROR = np.array([1.0, -1.0, -1.0])
+TOUCHING = {"sticking", "sliding_left", "sliding_right"}
+SCALE = np.array([1.0, 1.0, 0.02])  # of a wrench: forces, and torques at the size of these objects
 SAME = 1e-7  # [m] and [rad]
 
 
@@ -100,3 +105,55 @@ def test_the_object_moves_only_while_it_is_touched(k):
             pushed += int(moved)
             state = new
     assert pushed > 20
+
+
+def body_twists(run, cof):
+    """Between poses of a run, about the centre of friction, shape (n - 1, 3)."""
+    steps = log(compose(inverse(run.object[:-1]), run.object[1:]))
+    return np.array([shift_twist(V, cof) for V in steps])
+
+
+@pytest.mark.parametrize("model", ["ellipsoid", "exact"])
+@pytest.mark.parametrize(("shape", "k", "seed"), CASES)
+def test_the_fingers_can_give_the_wrench_that_friction_takes(shape, k, seed, model):
+    """Within the friction cones, at the edge where a finger slides, and never for free (seen in small steps)."""
+    thing, way, mu = case(shape, seed)
+    fine = np.concatenate([np.linspace(a, b, 400, endpoint=False) for a, b in pairwise(way)])
+    plant = Plant(thing, TIPS[k], 0.0025, model=model, friction=max(mu, 0.05))
+    run = plant.follow([0, 0, 0], fine)
+    modes = np.array(MODES)[run.modes]
+    checked = 0
+    steps = zip(body_twists(run, plant.cof), modes[:-1], modes[1:], run.object[1:], fine[1:], strict=True)
+    for twist, before, after, object_, hand in islice(steps, 0, None, 11):
+        feet = np.hypot(*velocity_at(twist, thing.support.pressure.points).T)
+        still = np.min(feet) < 0.05 * np.max(feet)  # a foot that stands may take any of many forces
+        if np.hypot(*twist[:2]) < 1e-6 or still or np.any(before != after) or not set(after) & TOUCHING:
+            continue
+        wrench = plant.surface.wrench(twist)
+        assert wrench @ twist > 0
+        edges = []
+        for tip, mode in zip(transform(inverse(object_), transform(hand, TIPS[k])), after, strict=True):
+            places = [place for place in facing(thing.outline, tip) if place[0] < 0.0025 + 1e-7]
+            for _, point, normal, _ in places:
+                contact = PointContact(point - plant.cof, normal, plant.friction, hook=True)
+                for force, slip in zip(contact.force_edges(), ("sliding_left", "sliding_right"), strict=True):
+                    if mode in {"sticking", slip} or len(places) > 1:
+                        edges.append(contact.wrench(force) / SCALE)
+        _, off = nnls(np.array(edges).T, wrench / SCALE)
+        # Of the step's order: at a corner the normal turns by the way that the tip makes, by its radius.
+        assert off < 0.01 * np.linalg.norm(wrench / SCALE)
+        checked += 1
+    assert checked > 30
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.003, 0.01])
+def test_a_finger_that_does_not_turn_rolls(radius):
+    """While it sticks, the contact goes along the edge by the radius times the turn of object and finger."""
+    thing = fp.Object([(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)], friction=2.0)
+    way = np.linspace([0.008, -0.02 - radius, 0.0], [0.012, 0.0, 0.3], 101)
+    run = Plant(thing, [[0.0, 0.0]], radius).follow([0, 0, 0], way)
+    assert {MODES[m] for m in run.modes[1:, 0]} == {"sticking"}
+    turn = run.object[-1, 2] - way[-1, 2]
+    assert abs(turn) > 0.1
+    moved = run.points[-1, 0, 0] - run.points[0, 0, 0]
+    assert moved == pytest.approx(-radius * turn, abs=1e-9)

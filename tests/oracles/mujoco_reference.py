@@ -16,7 +16,7 @@ HEIGHT, GRAVITY, HEAVY = 0.02, 300.0, 1e6
 # A contact that slides at v with the rate b is lifted by the friction μ b v in MuJoCo's soft cones; where that is not
 # far below the acceleration that presses it on, it hops. So the table is slippery and gravity strong: μ g counts.
 FOOT, LIGHT = 0.1, 0.002  # mass of a foot of mean load, and of everything else [kg]
-FOOT_RATE, SIDE_RATE = 1e4, 500.0
+FOOT_RATE, SIDE_RATE = 1e4, 200.0  # b at a foot, μ b at a finger [1/s]
 FLOOR = 0.02
 
 
@@ -78,7 +78,7 @@ def _model(
     )
     floor = "".join(_pair("floor", f"foot{k}", FLOOR, FOOT_RATE) for k in range(len(loads)))
     sides = "".join(
-        _pair(f"side{k}", f"tip{i}", thing.friction, SIDE_RATE)
+        _pair(f"side{k}", f"tip{i}", thing.friction, SIDE_RATE / thing.friction)
         for k in range(max(len(boxes), 1))
         for i in range(len(tips))
     )

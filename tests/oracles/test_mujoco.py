@@ -15,6 +15,7 @@ DISTANCE, ANGLE = 1e-4, np.deg2rad(0.1)
 RECTANGLE = [(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)]
 TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
 L_SHAPE = [(0.0, 0.0), (0.05, 0.0), (0.05, 0.02), (0.02, 0.02), (0.02, 0.06), (0.0, 0.06)]
+DISC_FEET = fp.Support.points([(0.02, 0.0), (-0.01, 0.0173), (-0.01, -0.0173)])
 THINGS = {
     "rectangle": fp.Object(
         RECTANGLE, fp.Support.points([(-0.018, -0.012), (0.02, -0.01), (0.0, 0.014)], [1, 2, 1.5]), 0.4
@@ -22,9 +23,8 @@ THINGS = {
     "triangle": fp.Object(
         TRIANGLE, fp.Support.points([(0.012, -0.006), (0.012, 0.008), (-0.025, -0.006)]), 0.4
     ),
-    "disc": fp.Object(
-        fp.Outline.circle(0.03), fp.Support.points([(0.02, 0.0), (-0.01, 0.0173), (-0.01, -0.0173)]), 0.4
-    ),
+    "disc": fp.Object(fp.Outline.circle(0.03), DISC_FEET, 0.4),
+    "smooth disc": fp.Object(fp.Outline.circle(0.03), DISC_FEET, 0.1),
     "L": fp.Object(
         L_SHAPE,
         fp.Support.points([(0.005, 0.005), (0.045, 0.01), (0.01, 0.055), (0.015, 0.015)], [1, 1, 1, 0.5]),
@@ -42,7 +42,7 @@ PUSHES = {
     ("triangle", "sticking"): ((-0.001, -0.0095), -5.0),
     ("triangle", "sliding"): ((0.001, -0.0095), 40.0),
     ("disc", "sticking"): ((0.003, -0.03), -5.7),
-    ("disc", "sliding"): ((-0.004, -0.03), 60.0),
+    ("smooth disc", "sliding"): ((0.01, -0.028), 45.0),
     ("L", "sticking"): ((0.023, 0.0), -5.7),
     ("L", "sliding"): ((0.024, 0.0), -45.0),
 }
@@ -65,8 +65,10 @@ def test_one_finger_straight_on(name, mode):
         [[*(tip + s * np.array([np.cos(angle), np.sin(angle)])), 0.0] for s in np.linspace(0, WAY, 51)]
     )
     run = Plant(thing, [[0.0, 0.0]], RADIUS).follow([0.0, 0.0, 0.0], hands)
-    modes = {MODES[m] for m in run.modes[1:, 0]}
-    assert (modes == {"sticking"}) if mode == "sticking" else (modes & {"sliding_left", "sliding_right"})
+    modes = np.array(MODES)[run.modes[1:, 0]]
+    assert "separation" not in modes
+    sliding = np.mean((modes == "sliding_left") | (modes == "sliding_right"))
+    assert sliding == 0 if mode == "sticking" else sliding > 0.7
     reference = push(
         thing, np.zeros(3), tip[None], RADIUS, length=WAY, angle=angle, boxes=BOXES.get(name, ())
     )

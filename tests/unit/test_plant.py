@@ -1,7 +1,5 @@
 """The plant: fingers and an object, step by step, compiled; its parts against their plain versions."""
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -177,11 +175,3 @@ def test_what_makes_no_sense_is_refused(square):
             plant.step(state, velocity, dt)
     with pytest.raises(InputError, match="one for each of 2 runs"):
         plant.many(np.zeros((2, 3)), [[-1.1, 0, 0]], friction=[0.1, 0.2, 0.3])
-
-
-def test_feet_on_one_line_are_not_compiled(square):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        feet = fp.Support.points([(-0.5, 0.0), (0.5, 0.0)])
-    with pytest.raises(fp.FlatpushError, match="does not know"):
-        Plant(square, [[0.0, 0.0]], 0.1, surface=Exact(feet))

@@ -140,8 +140,8 @@ class Plant:
         known = compilable(self.surface)
         self._plain = plain or len(tips) > 2 or not known
         kind, table = surface_table(self.surface) if known else (UNKNOWN, np.zeros((1, 1)))
-        #: (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels (if they know the kind).
-        self.pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
+        # (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels, if they know the kind.
+        self._pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
 
     def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
         """The state with the object at X_WO and the hand at X_WE, (3,) or one for each finger (k, 3).
@@ -187,9 +187,9 @@ class Plant:
         if not self._plain:
             from .kernels import follow as kernel
 
-            status, reached = kernel(*self.pack, q.copy(), hands, int(body), poses, seen)
+            status, reached = kernel(*self._pack, q.copy(), hands, int(body), poses, seen)
         if status in (_MANY, _UNDECIDED):
-            status, reached = runs.follow(self._written(self.pack), q, hands, int(body), poses, seen)
+            status, reached = runs.follow(self._written(self._pack), q, hands, int(body), poses, seen)
         return PlantRun(
             poses, seen[:, :, 0].astype(np.int8), seen[:, :, 1:3], seen[:, :, 3], OUTCOMES[status], reached
         )
@@ -218,7 +218,7 @@ class Plant:
         if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
             raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
         n, k = len(objects), len(self.fingers)
-        kind, table, cof, shape, mu, radius, fingers = self.pack
+        kind, table, cof, shape, mu, radius, fingers = self._pack
         hands = np.array(hand, dtype=float)
         hands = self._way(hands)[None] if hands.ndim == 2 else np.stack([self._way(h) for h in hands])
         tables, plain = table[None], self._plain
@@ -287,11 +287,11 @@ class Plant:
 
     def _push_out(self, q: Array, hands: Array) -> None:
         if self._plain:
-            runs.push_out(self._written(self.pack), q, hands)
+            runs.push_out(self._written(self._pack), q, hands)
         else:
             from .kernels import push_out
 
-            _, _, cof, shape, _, radius, fingers = self.pack
+            _, _, cof, shape, _, radius, fingers = self._pack
             push_out(shape, cof, radius, fingers, q, hands)
 
     def _written(self, pack: tuple[Any, ...], surface: LimitSurface | None = None) -> Fingers:
@@ -325,11 +325,11 @@ class Plant:
             from .kernels import advance
 
             begun, held = q.copy(), hands.copy()
-            status = advance(*self.pack, q, hands, step, 0, seen)
+            status = advance(*self._pack, q, hands, step, 0, seen)
             if status in (_MANY, _UNDECIDED):
                 q, hands = begun, held
         if status in (_MANY, _UNDECIDED):
-            status = runs.advance(self._written(self.pack), q, hands, step, 0, seen)
+            status = runs.advance(self._written(self._pack), q, hands, step, 0, seen)
         modes = tuple(MODES[int(code)] for code in seen[:, 0])
         return PlantState(
             q, hands if separate else hands[0], modes, seen[:, 1:3], seen[:, 3], OUTCOMES[status]
