@@ -49,8 +49,10 @@ PUSHES = {
 
 
 def assert_same(found, want):
-    assert np.hypot(*(found - want)[:2]) < DISTANCE
-    assert abs(found[2] - want[2]) < ANGLE
+    away = found - want
+    print(f" {1000 * np.hypot(*away[:2]):.3f} mm, {np.rad2deg(abs(away[2])):.3f}° apart")  # pytest -s shows it
+    assert np.hypot(*away[:2]) < DISTANCE
+    assert abs(away[2]) < ANGLE
 
 
 @pytest.mark.slow
