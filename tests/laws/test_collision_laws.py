@@ -94,7 +94,7 @@ def test_a_path_has_the_least_clearance_of_dense_samples(obstacles: int, seed: i
     least = min(measured(world, body, X) for X in samples)
     found = path_clearance(world, body, start, [step])
     if least < 0:
-        assert found.distance <= ROUNDING
+        assert found.distance < 0
     elif found.distance > 0:
         assert least - way / n - ROUNDING <= found.distance <= least + ROUNDING
         at = measured(world, body, compose(start, exp(found.fraction * step)))
@@ -139,13 +139,26 @@ def test_a_cross_without_a_corner_inside_the_other_overlaps() -> None:
     assert pose_clearance(world, body, (0.0, 3.0, 0.0)) == pytest.approx(2.8)
 
 
+def test_what_is_crossed_does_not_only_touch() -> None:
+    """A way through a wall once had the clearance 0 of one that touches it, and was free where 0 is asked for."""
+    wall = Outline.polygon([(4, -5), (4.001, -5), (4.001, 5), (4, 5)])
+    world, body = World.of(None, [wall]), Body.of(Outline.polygon([(0, 0), (1, 0), (1, 1), (0, 1)]))
+    for through in ([(6, 0, 0)], [(3.5, 0, 0)], [(3.001, 0, 0)], [(0, -7.0, 1.5)]):
+        found = path_clearance(world, body, (0, 0, 0), through)
+        assert found.distance < 0
+        assert found.obstacle == 0
+        assert found.fraction > 0
+    for along in ([(3, 0, 0)], [(3, 0, 0), (0, 2, 0), (-1, 0, 0)]):
+        assert path_clearance(world, body, (0, 0, 0), along).distance == 0
+
+
 @pytest.mark.parametrize("thickness", [1e-3, 1e-6])
 def test_nothing_is_jumped_however_thin(thickness: float) -> None:
     """A wall thinner than any step: the straight way through it and the turn through it are both found out."""
     wall = [(-thickness, -5), (thickness, -5), (thickness, 5), (-thickness, 5)]
     world, body = World.of(None, [Outline.polygon(wall)]), Body.of(Outline.circle(0.1))
-    assert path_clearance(world, body, (-1, 0, 0), [(2, 0, 0)]).distance <= 0
-    assert path_clearance(world, body, (-1, 0, 0.5), [(0, -3.0, np.pi)]).distance <= 0
+    assert path_clearance(world, body, (-1, 0, 0), [(2, 0, 0)]).distance < 0
+    assert path_clearance(world, body, (-1, 0, 0.5), [(0, -3.0, np.pi)]).distance < 0
     free = path_clearance(world, body, (-1, 0, 0), [(0, 2, 0)])
     assert free.distance == pytest.approx(0.9 - thickness)
     assert free.obstacle == 0

@@ -11,6 +11,7 @@ from flatpush.geometry.collision import Body, World, path_clearance
 from flatpush.planning.obstacles import Search, Way
 from flatpush.planning.obstacles.lattice import Lattice, Level, Reach
 from flatpush.planning.obstacles.polish import Chain
+from flatpush.planning.obstacles.trees import Trees
 from flatpush.steering.three_twist import words
 
 from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, stored_task
@@ -107,6 +108,21 @@ def test_polish_shortens_and_stays_free(task):
         check_way(task, chain.way)
         assert chain.way.cost <= chain.cost + 1e-12
     assert chain.cost < 0.98 * lattice.way.cost
+
+
+def test_random_trees_find_a_first_way(task):
+    for seed in range(12):
+        trees = Trees(task, seed)
+        if trees.way is not None:
+            check_way(task, trees.way)
+    one, two = Trees(task, 7), Trees(task, 7)
+    assert one.way is not None
+    assert one.way.pieces == two.way.pieces
+    # Where a word leads straight to the goal, it is found without any tree.
+    near = replace(task, goal=Way.of(task.fleet, task.start, [(1, 1, 0.01), (1, 0, 0.2)]).poses[-1])
+    assert Trees(near, 0, 3).work <= 3
+    assert Trees(near, 0, 3).way is not None
+    assert Trees(task, 0, 3).way is None
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -216,9 +232,8 @@ def test_walled_in_goals_end_with_words(data_folder):
 
 def test_a_start_in_collision_is_named(data_folder):
     scene = replace(maze_scene(data_folder), start=(0.2, 0.15, 0.0))
-    plan = fp.Planner(scene, tree=False).plan()
-    assert plan.status == "no_plan"
-    assert "at the start the object" in plan.reason
+    with pytest.raises(fp.InputError, match="at the start the object crosses obstacle 0"):
+        fp.Planner(scene, tree=False).plan()
 
 
 def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles(data_folder):

@@ -14,8 +14,9 @@ import numba as nb
 from ..pose import Array
 
 TURN = 2 * math.pi
-FEW = 24  # features that are all looked at; more are found through the grid
+FEW = 8  # features that are all looked at; more are found through the grid
 INSIDE = -math.inf  # of shapes that overlap, where no depth is known
+TOUCH = 1e-9  # what crosses by less than this touches [m]
 part = nb.njit(forceinline=True, error_model="numpy")
 inner = nb.njit(error_model="numpy")
 outer = nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -55,7 +56,7 @@ def arc_segment(
     sx: float, sy: float, ex: float, ey: float, sweep: float, radius: float,
     ax: float, ay: float, bx: float, by: float, inverse: float,
 ) -> float:  # fmt: skip
-    """Distance of a segment from the arc about the origin, counter-clockwise from s to e; zero if they meet."""
+    """Distance of a segment from the arc about the origin, counter-clockwise from s to e; INSIDE if they cross."""
     dx, dy = bx - ax, by - ay
     along = -(ax * dx + ay * dy) * inverse
     best = min(point_segment(sx, sy, ax, ay, bx, by, inverse), point_segment(ex, ey, ax, ay, bx, by, inverse))
@@ -67,8 +68,15 @@ def arc_segment(
         h = math.sqrt((square - foot) * inverse)
         for side in range(2):
             t = along + h if side == 0 else along - h
-            if 0.0 <= t <= 1.0 and within(ax + t * dx, ay + t * dy, sx, sy, ex, ey, sweep):
-                return 0.0
+            x, y = ax + t * dx, ay + t * dy
+            if 0.0 <= t <= 1.0 and within(x, y, sx, sy, ex, ey, sweep):
+                ends = min(
+                    min(math.hypot(x - ax, y - ay), math.hypot(x - bx, y - by)),
+                    min(math.hypot(x - sx, y - sy), math.hypot(x - ex, y - ey)),
+                )
+                if ends > TOUCH and radius - math.sqrt(foot) > TOUCH:
+                    return INSIDE
+                best = 0.0
     elif 0.0 < along < 1.0 and within(fx, fy, sx, sy, ex, ey, sweep):
         best = min(best, math.sqrt(foot) - radius)
     if within(ax, ay, sx, sy, ex, ey, sweep):
@@ -93,11 +101,11 @@ def segment_segment(
     sx: float, sy: float, ex: float, ey: float, one: float,
     ax: float, ay: float, bx: float, by: float, other: float,
 ) -> float:  # fmt: skip
-    """Distance of two segments with the inverses of their squared lengths; zero if they cross."""
-    if crosses(sx, sy, ex, ey, ax, ay, bx, by):
-        return 0.0
+    """Distance of two segments with the inverses of their squared lengths; INSIDE if they cross."""
     best = min(point_segment(sx, sy, ax, ay, bx, by, other), point_segment(ex, ey, ax, ay, bx, by, other))
     best = min(best, point_segment(ax, ay, sx, sy, ex, ey, one), point_segment(bx, by, sx, sy, ex, ey, one))
+    if crosses(sx, sy, ex, ey, ax, ay, bx, by):
+        return INSIDE if best > TOUCH * TOUCH else 0.0
     return math.sqrt(best)
 
 

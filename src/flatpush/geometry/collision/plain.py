@@ -64,7 +64,10 @@ def place(
     """Where along a twist a known clearance is met, and with what."""
     if not np.isfinite(distance):
         inside = [i for i, o in enumerate(world.obstacles) if _overlaps(o, body, np.asarray(start, float))]
-        return 0.0, inside[0] if inside else -2
+        if inside:
+            return 0.0, inside[0]
+        # What overlaps on the way crosses something first, at a distance of nothing or less.
+        return twist_clearance(world, body, start, step)[1:]
     if distance >= reach:
         return 0.0, -2
     _, fraction, obstacle = min(

@@ -27,6 +27,16 @@ inner = nb.njit(error_model="numpy")
 outer = nb.njit(cache=True, nogil=True, error_model="numpy")
 
 
+@inner
+def random(state: Any) -> float:
+    """Uniform in [0, 1): splitmix64."""
+    state[0] += np.uint64(0x9E3779B97F4A7C15)
+    z = state[0]
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) / 9007199254740992.0
+
+
 @outer
 def words(car: Array, law: Array, start: Array, goal: Array, out: Array) -> int:
     """All words of a car from pose to pose, cheapest first; fills rows (cost, letter, amount, …), returns how many.

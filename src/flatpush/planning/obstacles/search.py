@@ -1,4 +1,4 @@
-"""An anytime search among obstacles: lattices from coarse to fine, and every way that they find made better."""
+"""An anytime search among obstacles: trees, then lattices from coarse to fine, and every way they find made better."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,6 +12,7 @@ from .lattice import Lattice, Level, Reach
 from .path import Way
 from .polish import Chain
 from .task import Task
+from .trees import Trees
 
 FINER = 0.72  # from level to level
 SLACK = 1.03  # ways that are dearer than the best by this may still become the best
@@ -36,7 +37,7 @@ class Search:
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
         closed: whether there is provably no way: not even for a disc inside the object, of radius `disc` [m].
-        direct: whether such a disc has a way that is hardly longer than the straight one.
+        direct: whether such a disc is known to have a way that is hardly longer than the straight one.
     """
 
     def __init__(self, task: Task, seed: int) -> None:
@@ -46,7 +47,7 @@ class Search:
         self.nodes = 0
         self.finest = np.inf
         self.chains: list[Chain] = []
-        self.closed, self.disc, self.direct = False, 0.0, True
+        self.closed, self.disc, self.direct = False, 0.0, False
         self._rng = np.random.default_rng(seed)
         self._drawn: Lattice | None = None
 
@@ -71,12 +72,19 @@ class Search:
     def rounds(self) -> Iterator[Way | None]:
         """The best way so far after every round; ends only where there is provably none.
 
-        Two families of lattices take turns, one whose pushes change on the way and one of single pushes, which gets
+        Two random trees come first, for where there is room. Then two families of lattices take turns, one whose pushes change on the way and one of single pushes, which gets
         finer for the same work; each level is searched from the start or from the goal, in turns. What they find is
         polished at once, and the best ways again and again.
         """
         if not self.task.first or not self.task.last:
             return
+        trees = Trees(self.task, int(self._rng.integers(1 << 60)))
+        self.work, self.nodes = trees.work, trees.size
+        if trees.way is not None:
+            self.best = trees.way
+            yield self.best
+            self._add(trees.way)
+        yield self.best
         reaches = [Reach(self.task)]
         self.disc, self.closed, self.direct = reaches[0].radius, not reaches[0].open, reaches[0].direct
         if self.closed:
@@ -198,9 +206,7 @@ class Search:
 
 def level_of(task: Task, reach: Reach, k: int, changing: bool) -> Level:
     """The k-th lattice: cells from a third of the object down, steps that leave a cell, turns that change its layer."""
-    from .lattice.search import extent
-
-    box = extent(task)
+    box = task.extent
     size = task.bodies[0].outline.size
     largest = max(0.75 * float(np.sqrt(reach.radius * size)), float(np.sqrt(np.prod(box[2:] - box[:2]))) / 60)
     cell = largest * FINER**k

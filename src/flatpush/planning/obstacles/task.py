@@ -66,6 +66,16 @@ class Task:
         return arrays
 
     @cached_property
+    def extent(self) -> Array:
+        """The bounds, or a box around everything with room to pass by, (xmin, ymin, xmax, ymax)."""
+        F = self.world.features
+        points = [self.start[:2], self.goal[:2], F[:, :2] - F[:, 4:5], F[:, 2:4] + F[:, 4:5]]
+        every = np.concatenate([np.atleast_2d(p) for p in points])
+        margin = 2 * self.bodies[0].outline.size + 3 * float(np.max(self.fleet.radius))
+        box = np.concatenate([every.min(axis=0) - margin, every.max(axis=0) + margin])
+        return np.where(np.isfinite(self.world.bounds), self.world.bounds, box)
+
+    @cached_property
     def reversed(self) -> "Task":
         """The same task backwards in time: from the goal to the start, every motion the other way around."""
         fleet = self.fleet

@@ -44,7 +44,7 @@ class Reach:
 
         self.point, self.radius = largest_disc(task)
         ends = np.array([transform(X, self.point) for X in (task.start, task.goal)])
-        box = extent(task)
+        box = task.extent
         cell = max(0.35 * self.radius, float(np.sqrt(np.prod(box[2:] - box[:2]) / 6_000)))
         self.nx, self.ny = (int(n) + 1 for n in (box[2:] - box[:2]) / cell)
         self.cell, self.corner = cell, box[:2].copy()
@@ -165,15 +165,3 @@ def largest_disc(task: Task) -> tuple[Array, float]:
     shape = shapely.Polygon(outline.vertices)
     middle = np.array(shapely.maximum_inscribed_circle(shape, tolerance=0.02 * outline.size).coords[0])
     return middle, float(shape.exterior.distance(shapely.Point(*middle)))
-
-
-def extent(task: Task) -> Array:
-    """The bounds, or a box around everything with room to pass by, (xmin, ymin, xmax, ymax)."""
-    size, radius = task.bodies[0].outline.size, float(np.max(task.fleet.radius))
-    F = task.world.features
-    points = [task.start[:2], task.goal[:2], F[:, :2] - F[:, 4:5], F[:, 2:4] + F[:, 4:5]]
-    every = np.concatenate([np.atleast_2d(p) for p in points])
-    margin = 2 * size + 3 * radius
-    box = np.concatenate([every.min(axis=0) - margin, every.max(axis=0) + margin])
-    bounds = task.world.bounds
-    return np.where(np.isfinite(bounds), bounds, box)

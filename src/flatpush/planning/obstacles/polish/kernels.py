@@ -11,7 +11,7 @@ import numpy as np
 
 from ....geometry.pose import Array
 from ...refine.kernels import price
-from ..kernels import COLUMNS, LAST, WORDS, changes, connect, drive
+from ..kernels import COLUMNS, LAST, WORDS, changes, connect, drive, random
 
 MOST = 256
 FAR = 48  # legs of a path that one word may replace at first
@@ -24,18 +24,8 @@ outer = nb.njit(cache=True, nogil=True, error_model="numpy")
 
 
 @inner
-def _random(state: Any) -> float:
-    """Uniform in [0, 1): splitmix64."""
-    state[0] += np.uint64(0x9E3779B97F4A7C15)
-    z = state[0]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) / 9007199254740992.0
-
-
-@inner
 def _normal(state: Any) -> float:
-    return math.sqrt(-2.0 * math.log(1.0 - _random(state))) * math.cos(2.0 * math.pi * _random(state))
+    return math.sqrt(-2.0 * math.log(1.0 - random(state))) * math.cos(2.0 * math.pi * random(state))
 
 
 @outer
@@ -182,20 +172,20 @@ def polish(T: Any, poses: Array, pushes: Any, rows: Array, n: int, state: Any, m
     knot = KNOT * total(T, pushes, rows, n)
     cost = total(T, pushes, rows, n) + knot * n
     for _ in range(moves):
-        kind = _random(state)
+        kind = random(state)
         m = n
         _copy(poses, pushes, rows, n, new_poses, new_pushes, new_rows)
         if kind < 0.55 and (n > 1 or kind > 0.5):
             if (kind > 0.45 or n == 1) and n + 1 < MOST:  # with a new knot
-                leg = int(_random(state) * n)
-                m = _split(T, new_poses, new_pushes, new_rows, n, leg, _random(state))
+                leg = int(random(state) * n)
+                m = _split(T, new_poses, new_pushes, new_rows, n, leg, random(state))
                 low = high = leg + 1
             else:
-                low = 1 + int(_random(state) * (n - 1))
+                low = 1 + int(random(state) * (n - 1))
                 high = low
                 if kind < 0.15:
-                    high = min(n - 1, low + int(_random(state) * 4))
-            spread = math.exp(math.log(SMALL) + _random(state) * (math.log(LARGE) - math.log(SMALL)))
+                    high = min(n - 1, low + int(random(state) * 4))
+            spread = math.exp(math.log(SMALL) + random(state) * (math.log(LARGE) - math.log(SMALL)))
             limit = 0.0
             for i in range(low - 1, high + 1):
                 limit += new_rows[i, 0]
@@ -209,24 +199,24 @@ def polish(T: Any, poses: Array, pushes: Any, rows: Array, n: int, state: Any, m
         elif kind < 0.6:
             if n == 1:
                 continue
-            gone = 1 + int(_random(state) * (n - 1))
-            push = new_pushes[gone - 1] if _random(state) < 0.5 else new_pushes[gone]
+            gone = 1 + int(random(state) * (n - 1))
+            push = new_pushes[gone - 1] if random(state) < 0.5 else new_pushes[gone]
             m = _replace(T, new_poses, new_pushes, new_rows, n, gone - 1, gone + 1, push, buffer, here)
         else:
             if n + 2 >= MOST:
                 continue
-            first, last = int(_random(state) * n), int(_random(state) * n)
+            first, last = int(random(state) * n), int(random(state) * n)
             if first > last:
                 first, last = last, first
-            if _random(state) < 0.5:
-                last = min(last, first + 1 + int(_random(state) * 2))
-            u, v = _random(state), _random(state)
+            if random(state) < 0.5:
+                last = min(last, first + 1 + int(random(state) * 2))
+            u, v = random(state), random(state)
             begin, end = first, last + 1
             if first == last and u > v:
                 u, v = v, u
-            push = new_pushes[first] if _random(state) < 0.4 else new_pushes[last]
-            if _random(state) < 0.2:
-                push = int(_random(state) * k)
+            push = new_pushes[first] if random(state) < 0.4 else new_pushes[last]
+            if random(state) < 0.2:
+                push = int(random(state) * k)
             if v < 0.9:
                 m = _split(T, new_poses, new_pushes, new_rows, m, last, v)
             if u > 0.1:
