@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import read_mapping
+    from .robot_log import RobotLog, RobotRun, load_robot_log
     from .rollout_file import save_rollouts
     from .runs_file import save_runs
     from .scene_reader import load_scene, parse_scene
@@ -23,10 +24,13 @@ if TYPE_CHECKING:
 __all__ = [
     "BadRow",
     "PairsFile",
+    "RobotLog",
+    "RobotRun",
     "check_writable",
     "export_csv",
     "load_pairs",
     "load_plan",
+    "load_robot_log",
     "load_scene",
     "load_surface",
     "parse_plan",
@@ -47,10 +51,13 @@ __all__ = [
 _HOME = {
     "BadRow": "pairs_file",
     "PairsFile": "pairs_file",
+    "RobotLog": "robot_log",
+    "RobotRun": "robot_log",
     "check_writable": "atomic",
     "export_csv": "export",
     "load_pairs": "pairs_file",
     "load_plan": "plan_file",
+    "load_robot_log": "robot_log",
     "load_scene": "scene_reader",
     "load_surface": "surface_file",
     "parse_plan": "plan_file",
