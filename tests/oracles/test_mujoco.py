@@ -50,7 +50,9 @@ PUSHES = {
 
 def assert_same(found, want):
     away = found - want
-    print(f" {1000 * np.hypot(*away[:2]):.3f} mm, {np.rad2deg(abs(away[2])):.3f}° apart")  # pytest -s shows it
+    print(
+        f" {1000 * np.hypot(*away[:2]):.3f} mm, {np.rad2deg(abs(away[2])):.3f}° apart"
+    )  # pytest -s shows it
     assert np.hypot(*away[:2]) < DISTANCE
     assert abs(away[2]) < ANGLE
 
