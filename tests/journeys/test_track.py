@@ -53,6 +53,7 @@ def test_what_makes_no_sense_is_refused(plan):
         ("--noise", "-1,0", "0 or more"),
         ("--camera", "0", "camera is positive"),
         ("--friction", "-0.1", "0 or more"),
+        ("--timing", "late", "even, plan"),
         ("--figure", "run.gif", "ends in"),
     ):
         with pytest.raises(fp.InputError, match=rule):
@@ -77,6 +78,23 @@ def test_what_the_path_law_follows_exactly_ends_at_the_goal(plan):
     assert run.outcome == "arrived"
     assert distance < 5e-5
     assert np.rad2deg(turn) < 0.05
+
+
+def test_with_the_plan_s_time_law_the_pusher_keeps_to_the_plan(plan):
+    """From rest to rest in each arc, within the pusher's speed and acceleration, and in the plan's time."""
+    run = drives(plan[0], "path", plan[0].scene.start_pose, timing="plan")
+    distance, turn = goal_error(plan[0], run.object[-1])
+    assert run.outcome == "arrived"
+    assert distance < 5e-5
+    assert np.rad2deg(turn) < 0.05
+    pushing = [k for k, mode in enumerate(run.modes) if mode in ("path", "saturated")]
+    assert (pushing[-1] - pushing[0]) / 60 == pytest.approx(plan[0].pushes[0].times[-1], rel=0.02)
+    velocity = 60 * np.diff(run.pusher[pushing][:, :2], axis=0)
+    pusher = plan[0].scene.pusher
+    assert np.max(np.hypot(*velocity.T)) < 1.001 * pusher.speed
+    assert np.quantile(60 * np.hypot(*np.diff(velocity, axis=0).T), 0.97) < 1.1 * pusher.acceleration
+    with pytest.raises(fp.InputError, match="rests between its arcs"):
+        PlanController.of(plan[0], "dfl", timing="plan")
 
 
 def test_feedback_brings_back_what_grows_without_it(plan):

@@ -37,16 +37,25 @@ def run(controller, plant, start, duration, camera=PERFECT, seed=0):
     return drive(controller, plant, start, compose(start, model.pusher), sensor, duration)
 
 
-def test_references_of_a_plan_are_exact(one_finger_plan):
-    """z_d agrees with the plan's poses, its derivatives with differences, and z is C¹ at junctions."""
+@pytest.mark.parametrize("timed", [False, True])
+def test_references_of_a_plan_are_exact(one_finger_plan, timed):
+    """z_d agrees with the plan's poses (with its time law also at their times), its derivatives with differences."""
     (segment, *_) = one_finger_plan.pushes
     from flatpush.planning.options import push_option
     from flatpush.problem.mechanics import named
 
     car = push_option(one_finger_plan.scene, named(one_finger_plan.scene, segment.push)).car
     model = SteeringModel.of_car(car)
-    path = PathReference.of_push(segment, model)
+    path = PathReference.of_push(segment, model, pusher=one_finger_plan.scene.pusher if timed else None)
     z = transform(segment.object, model.flat_point)
+    if timed:
+        assert path.duration == pytest.approx(segment.times[-1])
+        np.testing.assert_allclose([path.at(t).position for t in segment.times], z, atol=1e-8)
+        dt = 1 / 60
+        for t in np.linspace(0, 1, 57)[:-1] * path.duration:  # the law by arc length, tick by tick
+            (s, _, before), (wanted, _, after) = path.run(t), path.run(t + dt)
+            if before == after:
+                assert path.speed_from(s, dt) * dt == pytest.approx(wanted - s, rel=1e-6)
     # Every sample lies on the path, and the last at its end.
     ends = [path.at(0).position, path.at(path.duration).position]
     np.testing.assert_allclose(ends, z[[0, -1]], atol=1e-9)
@@ -58,7 +67,11 @@ def test_references_of_a_plan_are_exact(one_finger_plan):
             np.testing.assert_allclose(
                 (after.velocity - before.velocity) / (2 * h), now.acceleration, atol=1e-7
             )
-    check_reference(path)
+    if timed:
+        with pytest.raises(fp.InputError, match="vanishes on the way"):
+            check_reference(path)
+    else:
+        check_reference(path)
 
 
 def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():

@@ -12,6 +12,7 @@ from ..errors import InputError
 from .common import error_text, numbers, pose_text, print_json
 
 CONTROLLERS = ("path", "dfl", "horizon")
+TIMINGS = ("even", "plan")
 
 
 def command(
@@ -27,6 +28,9 @@ def command(
     ] = None,
     centre: Annotated[str, typer.Option(help="The centre of friction is off by DX,DY [mm].")] = "0,0",
     start: Annotated[str, typer.Option(help="The start is off by DX,DY,DEG [mm, deg].")] = "0,0,0",
+    timing: Annotated[
+        str, typer.Option(help="path: at an even speed, or with the time law of the plan: even, plan.")
+    ] = "even",
     frequency: Annotated[float, typer.Option(help="dfl: natural frequency [rad/s].")] = 2.0,
     damping: Annotated[float, typer.Option(help="dfl: damping ratio.")] = 1.0,
     learn: Annotated[bool, typer.Option("--learn", help="Learn the steering while pushing.")] = False,
@@ -39,6 +43,8 @@ def command(
 
     if controller not in CONTROLLERS:
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
+    if timing not in TIMINGS:
+        raise InputError(f"--timing is one of {', '.join(TIMINGS)}", value=timing)
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
     if friction is not None and not (math.isfinite(friction) and friction >= 0):
@@ -55,8 +61,8 @@ def command(
         check_writable(figure)
         check_ending(figure, (".svg", ".png"))
     run = _run(
-        loaded, controller, rate, spread, camera, latency, dropped, friction, shift, off, frequency, damping,
-        learn, seed,
+        loaded, controller, rate, spread, camera, latency, dropped, friction, shift, off, timing, frequency,
+        damping, learn, seed,
     )  # fmt: skip
     result = _result(loaded, run, controller)
     if figure is not None:
@@ -75,8 +81,8 @@ def command(
 
 def _run(
     plan: Any, name: str, rate: float, spread: list[float], camera: float, latency: float, dropped: float,
-    friction: float | None, shift: list[float], off: list[float], frequency: float, damping: float, learn: bool,
-    seed: int,
+    friction: float | None, shift: list[float], off: list[float], timing: str, frequency: float, damping: float,
+    learn: bool, seed: int,
 ) -> Any:  # fmt: skip
     import numpy as np
 
@@ -98,7 +104,7 @@ def _run(
     else:
         sd = (max(eye.position, 1e-5), max(eye.angle, 1e-4))
         gains = Gains.of(frequency, damping)
-        law = PlanController.of(plan, name, rate, gains=gains, learn=learn, sd=sd)  # type: ignore[arg-type]
+        law = PlanController.of(plan, name, rate, gains=gains, timing=timing, learn=learn, sd=sd)  # type: ignore[arg-type]
     scene, first = plan.scene, plan.pushes[0]
     if any(not np.allclose(p.fingers.shape, first.fingers.shape) for p in plan.pushes):
         raise InputError("every push of a tracked plan has as many fingers as the first")

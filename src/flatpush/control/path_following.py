@@ -62,7 +62,7 @@ def path_command(
 
 @dataclass(frozen=True, eq=False)
 class PathController(AbstractController[PathState]):
-    """Follows a path at a flat speed, wherever along it the object is.
+    """Follows a path at its flat speed or with its time law, wherever along it the object is.
 
     Args:
         model: of the push. path: of its flat point, and the flat speed. rate: of the ticks [Hz].
@@ -141,7 +141,8 @@ class PathController(AbstractController[PathState]):
             return replace(state, mode="waiting", note=note, seen=with_command(state.seen, time, stop)), STOP
         m, dt = self.model, 1 / self.rate
         pose = predicted(state.seen, time, m)
-        found = path_command(m, self.path, pose, state.length, self.path.speed, dt, self.gains)
+        wanted = self.path.speed_from(state.length, dt)
+        found = path_command(m, self.path, pose, state.length, wanted, dt, self.gains)
         if found is None:
             return replace(state, mode="done", outcome=ARRIVED, length=self.path.length), STOP
         speed, omega, length, bounded = found

@@ -63,6 +63,7 @@ class PlanController(AbstractController[PlanState]):
         rate: float = 60.0,
         *,
         gains: Gains | None = None,
+        timing: Literal["even", "plan"] = "even",
         learn: bool = False,
         sd: tuple[float, float] = (0.0003, float(np.deg2rad(0.3))),
         stale: float = 0.5,
@@ -71,11 +72,18 @@ class PlanController(AbstractController[PlanState]):
 
         Args:
             gains: of the law dfl; default: natural frequency 2 rad/s, critically damped.
+            timing: "even": a constant flat speed, the mean of the plan, through all junctions; "plan": the plan's time
+                law, from rest to rest in each arc, for the law path.
             learn: adapts the model of each push. sd: of a frame's position and angle [m, rad], for learning.
 
         Raises:
             InputError: for a plan without pushes, and as the laws do.
         """
+        if timing == "plan" and law != "path":
+            raise InputError(
+                "feedback linearisation needs a flat speed > 0, and the plan's time law rests between its arcs",
+                key="timing", value=timing, hint="Use an even speed, or the path law.",
+            )  # fmt: skip
         if plan.status != "solved" or not plan.pushes:
             raise InputError("there is no push to follow in this plan", hint="It has none, or is not solved.")
         scene = plan.scene
@@ -86,7 +94,7 @@ class PlanController(AbstractController[PlanState]):
             if option.car is None:
                 raise InputError(f"the push {segment.push!r} cannot be steered: {option.refusal}")
             model = SteeringModel.of_car(option.car, scene.pusher.turns, whole.car)
-            path = PathReference.of_push(segment, model)
+            path = PathReference.of_push(segment, model, pusher=scene.pusher if timing == "plan" else None)
             one: Any
             if law == "dfl":
                 one = TrackingController(model, gains or Gains.of(2.0), rate, reference=path, stale=stale)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..geometry import compose, cross, exp, perpendicular, rotate, transform, velocity_at
+from ..geometry import compose, cross, exp, perpendicular, relative, rotate, transform, velocity_at
 from ..geometry.pose import Array
-from ..problem import PushSegment
+from ..planning.timing import Trapezoid
+from ..problem import Arc, Pusher, PushSegment
 from .laws.plain import place
 from .steering_model import SteeringModel
 
@@ -40,15 +41,17 @@ class AbstractReference(ABC):
 
 @dataclass(frozen=True, eq=False)
 class PathReference(AbstractReference):
-    """Arcs and lines at a constant flat speed through the junctions: z is C¹ there, z̈ jumps.
+    """Arcs and lines, at a constant flat speed through the junctions (z is C¹ there, z̈ jumps) or with a time law.
 
     Attributes:
         table: the path, shape (n, 6), see control.laws.plain.
-        speed: of the flat point [m/s].
+        speed: of the flat point [m/s]; with a time law, its largest.
+        laws: of the flat point in each piece, from rest to rest; none: the speed is constant.
     """
 
     table: Array
     speed: float
+    laws: tuple[Trapezoid, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.speed) and self.speed > 0):
@@ -57,6 +60,8 @@ class PathReference(AbstractReference):
             raise InputError("a path has at least one piece", value=self.table.shape)
         if not np.all(np.isfinite(self.table)) or np.any(self.table[:, 1] <= 0):
             raise InputError("the pieces of a path are finite and of positive length")
+        if self.laws and len(self.laws) != len(self.table):
+            raise InputError("a time law for each piece is needed", key="laws", value=len(self.laws))
 
     @property
     def length(self) -> float:
@@ -64,12 +69,36 @@ class PathReference(AbstractReference):
 
     @property
     def duration(self) -> float:  # type: ignore[override]
-        return self.length / self.speed
+        return sum(law.duration for law in self.laws) if self.laws else self.length / self.speed
 
     def at(self, time: float) -> FlatState:
-        x, y, angle, bend = place(self.table, self.speed * time)
+        length, v, a = self.run(time)
+        x, y, angle, bend = place(self.table, length)
         t = np.array([np.cos(angle), np.sin(angle)])
-        return FlatState(np.array([x, y]), self.speed * t, self.speed**2 * bend * perpendicular(t))
+        return FlatState(np.array([x, y]), v * t, a * t + v**2 * bend * perpendicular(t))
+
+    def run(self, time: float) -> tuple[float, float, float]:
+        """Arc length, flat speed and its rate at a time."""
+        if not self.laws:
+            return self.speed * time, self.speed, 0.0
+        for row, law in zip(self.table, self.laws, strict=True):
+            if time <= law.duration or row is self.table[-1]:
+                break
+            time -= law.duration
+        t, a, r = min(max(time, 0.0), law.duration), law.acceleration, law.ramp
+        left = law.duration - t
+        rate = a if t < r else -a if left < r else 0.0
+        return float(row[0] + law.travelled(np.array(t))), a * min(t, left, r), rate
+
+    def speed_from(self, length: float, dt: float) -> float:
+        """Mean flat speed that the time law asks for in a tick that begins at an arc length; never 0 before the end."""
+        if not self.laws:
+            return self.speed
+        k = int(np.clip(np.searchsorted(self.table[:, 0], length, side="right") - 1, 0, len(self.laws) - 1))
+        law, gone = self.laws[k], max(0.0, length - float(self.table[k, 0]))
+        step = 0.5 * law.acceleration * dt
+        braking = np.sqrt(2 * law.acceleration * max(0.0, law.length - gone)) - step
+        return float(min(law.speed, np.sqrt(2 * law.acceleration * gone) + step, max(braking, step)))
 
     @classmethod
     def straight(cls, start: ArrayLike, angle: float, length: float, speed: float) -> "PathReference":
@@ -79,19 +108,26 @@ class PathReference(AbstractReference):
 
     @classmethod
     def of_push(
-        cls, segment: PushSegment, model: SteeringModel, speed: float | None = None
+        cls,
+        segment: PushSegment,
+        model: SteeringModel,
+        speed: float | None = None,
+        pusher: Pusher | None = None,
     ) -> "PathReference":
         """The path of a planned push, from its arcs.
 
         Args:
             speed: of the flat point [m/s]; default: the mean of the plan.
+            pusher: given, each arc has the plan's time law within this pusher's speed and acceleration.
 
         Raises:
             InputError: where the flat point rests or reverses in an arc.
         """
         X = np.asarray(segment.object[0], dtype=float)
         rows: list[list[float]] = []
+        laws: list[Trapezoid] = []
         done = 0.0
+        tips = transform(relative(segment.object[0], segment.pusher[0]), segment.fingers)
         for arc in segment.arcs:
             v = velocity_at(arc.twist, model.flat_point)
             size, h = float(np.hypot(*v)), model.direction
@@ -107,11 +143,26 @@ class PathReference(AbstractReference):
             rows.append([done, length, *z, angle, float(arc.twist[2]) / size])
             done += length
             X = compose(X, exp(arc.duration * arc.twist))
+            if pusher is not None:
+                laws.append(_law(length, arc, tips, pusher))
         if not rows:
             raise InputError("a push without arcs has no reference")
+        if laws:
+            speed = max(law.ramp * law.acceleration for law in laws)
         if speed is None:
             speed = done / float(segment.times[-1])
-        return cls(np.array(rows), speed)
+        return cls(np.array(rows), speed, tuple(laws))
+
+
+def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Trapezoid:
+    """The planner's time law of an arc, for the fastest of the fingertips (k, 2) in O, in the flat point's lengths."""
+    fastest = float(np.max(np.hypot(*velocity_at(arc.twist, tips).T)))
+    turn = abs(float(arc.twist[2]))
+    law = Trapezoid.along(
+        fastest * arc.duration, fastest / turn if turn > 0 else np.inf, pusher.speed, pusher.acceleration
+    )
+    share = length / law.length
+    return Trapezoid(length, share * law.speed, share * law.acceleration)
 
 
 def check_reference(reference: AbstractReference, most: float = np.inf) -> None:
