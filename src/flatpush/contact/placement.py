@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry import Outline, OutlinePoint, cross, perpendicular, rotate, wrap_angle
