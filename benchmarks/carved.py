@@ -22,7 +22,16 @@ OBJECTS = (
 )
 
 
-def carved(seed: int, time_limit: float = 5.0) -> fp.Scene:
+def carved_task(seed: int):
+    """A carved scene's task with the one push of its path."""
+    from flatpush.planning.obstacles import task_of
+
+    scene, used = carved(seed, most=1, with_pushes=True)
+    planner = fp.Planner(replace(scene, pushes=(used[0].push,)), tree=False)
+    return task_of(planner.scene, planner.usable, planner.fleet)
+
+
+def carved(seed: int, time_limit: float = 5.0, most: int = 3, with_pushes: bool = False):
     """A scene with 5 to 40 obstacles about the path of one to three random pushes."""
     rng = np.random.default_rng(seed)
     thing = fp.Object(OBJECTS[seed % 3], "uniform", friction=float(rng.uniform(0.25, 0.6)))

@@ -11,7 +11,7 @@ from flatpush.contact import (
     straight_force,
     two_point_sticks,
 )
-from flatpush.contact.placement import travel
+from flatpush.contact.placement import travels
 from flatpush.errors import InputError, NoDubinsReduction
 from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Support, local_ellipsoid
 from flatpush.geometry import Outline, perpendicular, rotate, velocity_at
@@ -151,7 +151,8 @@ def test_two_fingers_fit_the_recorded_butterfly(data_folder, edge):
     recorded = np.loadtxt(data_folder / "plan_graph" / "shape_butterfly.csv", delimiter=",", skiprows=1)
     outline = Outline.polygon(recorded)
     towards = {"left": (1, 0), "right": (-1, 0), "above": (0, -1), "below": (0, 1)}[edge]
-    _, middle = travel(outline, -0.05 * np.array(towards), np.array(towards, dtype=float), 0.0)
+    _, touched = travels(outline, -0.05 * np.array([towards]), np.array([towards], dtype=float), 0.0)
+    middle = touched[0]
     at = outline.nearest(middle + 1e-6)  # not exactly at one of its many corners
     placement = place_fingers(outline, at, 2, 0.018, 0.0025)
     for tip, point in zip(placement.tips, placement.points, strict=True):

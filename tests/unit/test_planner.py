@@ -127,6 +127,18 @@ def test_lists_of_pushes_are_checked(triangle):
         fp.Scene(triangle, STARTS[0], pushes=(push, push))
 
 
+def test_automatic_pushes_are_sought_once_for_an_object(triangle):
+    """What is asked for decides: other poses share them, another friction margin or cost does not."""
+    scene = fp.Scene(triangle, STARTS[0])
+    pushes = fp.Planner(scene, tree=False).scene.pushes
+    assert fp.Planner(replace(scene, start=STARTS[1]), tree=False).scene.pushes is pushes
+    for other in (fp.Planning(friction_margin=0.5), fp.Planning(cost="pusher")):
+        assert fp.Planner(replace(scene, planning=other), tree=False).scene.pushes is not pushes
+    twin = fp.Object(triangle.outline, "uniform", triangle.friction)
+    again = fp.Planner(replace(scene, object=twin), tree=False).scene.pushes
+    assert [p.at.along for p in again] == [p.at.along for p in pushes]
+
+
 def test_no_automatic_push_at_all_is_no_plan_that_can_be_saved(triangle, tmp_path):
     slippery = fp.Object(triangle.outline, "uniform", friction=0.0)
     found = fp.plan(fp.Scene(slippery, STARTS[0]))

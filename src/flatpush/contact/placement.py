@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry import Outline, OutlinePoint, cross, perpendicular, rotate, wrap_angle
@@ -12,6 +11,8 @@ from ..geometry.pose import Array
 
 # A fingertip may rest on a corner only where the outline is nearly smooth there.
 SMOOTH_CORNER = np.deg2rad(20.0)
+# Two fingers turn until both touch: how finely and how far is looked for that.
+STEP, SCAN = np.deg2rad(2.0), 22
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,69 +65,76 @@ def place_fingers(
 
     heading = float(np.arctan2(at.normal[1], at.normal[0]))
 
-    def reach(angle: float) -> list[tuple[float, Array] | None]:
-        x, y = rotate(angle, [1.0, 0.0]), rotate(angle, [0.0, 1.0])
+    def reach(angles: Array) -> tuple[Array, Array]:
+        """How far the left and the right tip travel, shape (2, m), and where they touch, shape (2, m, 2)."""
+        x = np.column_stack([np.cos(angles), np.sin(angles)])
+        y = perpendicular(x)
         back = at.point - 2 * outline.size * x
-        return [travel(outline, back + side * spacing / 2 * y, x, tip_radius) for side in (1, -1)]
+        starts = np.concatenate([back + spacing / 2 * y, back - spacing / 2 * y])
+        ways, touched = travels(outline, starts, np.concatenate([x, x]), tip_radius)
+        return ways.reshape(2, -1), touched.reshape(2, -1, 2)
 
-    def imbalance(angle: float) -> float:
-        left, right = reach(angle)
-        if left is None or right is None:
-            raise InputError("only one of the fingers meets the outline there", value=at.point)
-        return left[0] - right[0]
+    def imbalance(angles: Array) -> Array:
+        left, right = reach(angles)[0]
+        with np.errstate(invalid="ignore"):
+            return np.where(np.isfinite(left) & np.isfinite(right), left - right, np.nan)
 
     angle = _balance(imbalance, heading, 1e-12 * outline.size)
-    left, right = reach(angle)
-    if left is None or right is None or abs(left[0] - right[0]) > 1e-7 * outline.size:
+    if angle is None:
+        raise InputError("only one of the fingers meets the outline there", value=at.point)
+    ways, touched = reach(np.array([angle]))
+    left, right = float(ways[0, 0]), float(ways[1, 0])
+    if not np.isfinite(left + right) or abs(left - right) > 1e-7 * outline.size:
         raise InputError("the two fingers cannot both touch the outline there", value=at.point)
     x = rotate(angle, [1.0, 0.0])
     y = perpendicular(x)
-    middle = at.point - 2 * outline.size * x + 0.5 * (left[0] + right[0]) * x
+    middle = at.point - 2 * outline.size * x + 0.5 * (left + right) * x
     tips = np.stack([middle + spacing / 2 * y, middle - spacing / 2 * y])
-    points = np.stack([left[1], right[1]])
+    points = touched[:, 0]
     if np.max(np.linalg.norm(points - at.point, axis=1)) > 2 * spacing + 2 * tip_radius:
         raise InputError("another part of the outline is in the fingers' way there", value=at.point)
     normals = np.stack([_normal(outline, p, t) for p, t in zip(points, tips, strict=True)])
     return Placement(points, normals, tips, np.array([*middle, wrap_angle(angle)]))
 
 
-def travel(
-    outline: Outline, start: ArrayLike, direction: Array, tip_radius: float
-) -> tuple[float, Array] | None:
-    """How far a disc travels along a direction until it touches the outline, and where it then touches.
+def travels(outline: Outline, starts: Array, directions: Array, tip_radius: float) -> tuple[Array, Array]:
+    """How far discs travel along directions until they touch the outline, and where they then touch.
 
-    None if it never does. The start lies outside, with the outline ahead.
+    Args:
+        starts: of the centres, outside, with the outline ahead, shape (m, 2); directions: unit vectors, (m, 2).
+
+    Returns:
+        ways (m,) [m], infinite where a disc never touches, and points (m, 2).
     """
-    q = np.asarray(start, dtype=float)
+    q = np.asarray(starts, dtype=float)
     if outline.is_circle:
-        s = _ray_circle(q, direction, outline.centre[None], outline.radius + tip_radius)[0]
-        if not np.isfinite(s):
-            return None
-        out = q + s * direction - outline.centre
-        return float(s), outline.centre + outline.radius * out / np.hypot(*out)
+        ways = _ray_circles(q, directions, outline.centre[None], outline.radius + tip_radius)[:, 0]
+        out = q + np.where(np.isfinite(ways), ways, 0.0)[:, None] * directions - outline.centre
+        return ways, outline.centre + outline.radius * out / np.linalg.norm(out, axis=1)[:, None]
     a, b = outline.edges[:, 0], outline.edges[:, 1]
-    inward = outline.edge_normals
-    shifted = a - tip_radius * inward
-    closing = inward @ direction
+    inward, d = outline.edge_normals, b - a
+    closing = directions @ inward.T
+    gap = np.sum(inward * (a - tip_radius * inward), axis=1) - q @ inward.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = np.einsum("ij,ij->i", inward, shifted - q) / closing
-    d = b - a
-    along = np.einsum("ij,ij->i", q + np.where(closing > 0, s, 0.0)[:, None] * direction - a, d)
-    length2 = np.einsum("ij,ij->i", d, d)
-    s = np.where((closing > 1e-12) & (along >= 0) & (along <= length2), s, np.inf)
-    corners = _ray_circle(q, direction, a, tip_radius)
-    edge, corner = int(np.argmin(s)), int(np.argmin(corners))
-    if not np.isfinite(min(s[edge], corners[corner])):
-        return None
-    if s[edge] <= corners[corner]:
-        return float(s[edge]), q + s[edge] * direction + tip_radius * inward[edge]
-    return float(corners[corner]), a[corner].copy()
+        to_edges = np.where(closing > 1e-12, gap / closing, np.inf)
+    along = q @ d.T - np.sum(a * d, axis=1)
+    along += np.where(closing > 1e-12, to_edges, 0.0) * (directions @ d.T)
+    to_edges = np.where((along >= 0) & (along <= np.sum(d * d, axis=1)), to_edges, np.inf)
+    to_corners = _ray_circles(q, directions, a, tip_radius)
+    rows = np.arange(len(q))
+    edge, corner = np.argmin(to_edges, axis=1), np.argmin(to_corners, axis=1)
+    first = to_edges[rows, edge]
+    on_edge = first <= to_corners[rows, corner]
+    ways = np.where(on_edge, first, to_corners[rows, corner])
+    there = q + np.where(np.isfinite(first), first, 0.0)[:, None] * directions + tip_radius * inward[edge]
+    return ways, np.where(on_edge[:, None], there, a[corner])
 
 
-def _ray_circle(q: Array, direction: Array, centres: Array, radius: float) -> Array:
-    offset = centres - q
-    middle = offset @ direction
-    inside = radius**2 - cross(direction, offset) ** 2
+def _ray_circles(q: Array, directions: Array, centres: Array, radius: float) -> Array:
+    """Ways until rays (m,) enter circles (k,), shape (m, k); infinite where they do not."""
+    offset = centres[None] - q[:, None]
+    middle = np.einsum("mki,mi->mk", offset, directions)
+    inside = radius**2 - cross(directions[:, None], offset) ** 2
     return np.where(inside >= 0, middle - np.sqrt(np.maximum(inside, 0.0)), np.inf)
 
 
@@ -144,23 +152,37 @@ def _normal(outline: Outline, point: Array, tip: Array) -> Array:
     return away / np.hypot(*away) if np.hypot(*away) > 0 else (before + after) / np.hypot(*(before + after))
 
 
-def _balance(imbalance: Callable[[float], float], start: float, tolerance: float) -> float:
-    """A zero of the imbalance near the start angle: outward scan for a change of sign, then bisection."""
-    value = imbalance(start)
+def _balance(imbalance: Callable[[Array], Array], start: float, tolerance: float) -> float | None:
+    """A zero of the imbalance near the start angle: outward scan for a change of sign, then ever finer scans.
+
+    Where there is none, the start; None if there is no value even there.
+    """
+    value = float(imbalance(np.array([start]))[0])
+    if np.isnan(value):
+        return None
     if abs(value) <= tolerance:
         return start
-    step = np.deg2rad(2.0)
-    for k in range(1, 23):
+    k = np.arange(-SCAN, SCAN + 1)
+    values = imbalance(start + STEP * k)
+    for j in range(1, SCAN + 1):
         for side in (1, -1):
-            far, near = start + side * k * step, start + side * (k - 1) * step
-            try:
-                low, high = imbalance(near), imbalance(far)
-            except InputError:
-                continue
-            if low == 0 or low * high < 0:
-                for _ in range(60):
-                    middle = 0.5 * (near + far)
-                    m = imbalance(middle)
-                    near, far, low = (middle, far, m) if m * low > 0 else (near, middle, low)
-                return 0.5 * (near + far)
+            near, far = SCAN + side * (j - 1), SCAN + side * j
+            if values[near] == 0 or values[near] * values[far] < 0:
+                return _finer(imbalance, start + STEP * k[near], start + STEP * k[far])
     return start
+
+
+def _finer(imbalance: Callable[[Array], Array], near: float, far: float) -> float:
+    """The first change of sign between two angles, to the last digits."""
+    for _ in range(14):
+        angles = np.linspace(near, far, 18)
+        values = imbalance(angles)
+        if values[0] == 0:
+            return near
+        after = np.flatnonzero(~(values * values[0] > 0))
+        if not len(after):
+            return far
+        near, far = float(angles[after[0] - 1]), float(angles[after[0]])
+        if abs(far - near) <= 4e-16 * max(1.0, abs(near)):
+            break
+    return 0.5 * (near + far)

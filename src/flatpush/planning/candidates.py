@@ -1,19 +1,25 @@
 """Automatic push points: on each edge or smooth stretch, the contact with the smallest turning radius."""
 
 from dataclasses import dataclass, replace
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..contact.placement import SMOOTH_CORNER
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
-from ..problem import Push, Scene
+from ..problem import Object, Push, Scene
 from .options import PushOption, push_option
 
 # A stretch ends where its normal has turned this far, so that a smooth outline gets pushes from all sides.
 STRETCH = np.deg2rad(90.0)
 COARSE, REFINED = 9, 8
 MOST = 8
+# What of how to plan makes a push a good one.
+ASKED = "model", "two_finger", "friction_margin", "cost"
+Found = tuple[tuple[Push, ...], tuple[PushOption, ...]]
+_known: WeakKeyDictionary[Object, dict[tuple[Any, ...], Found]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +58,21 @@ class Stretch:
         return ((before + along * self.lengths) / self.lengths.sum())[on]
 
 
-def automatic_pushes(scene: Scene) -> tuple[tuple[Push, ...], tuple[PushOption, ...]]:
+def automatic_pushes(scene: Scene) -> Found:
     """A small set of pushes that is worth switching between, and those left out, with the reason.
 
     One push of each edge or smooth stretch; of more than MOST, those are kept that push in different
-    directions, smaller turning radii first.
+    directions, smaller turning radii first. They are sought once for an object: scenes that differ only in their
+    poses, their workspace or how the search is done share them.
     """
+    asked = scene.pusher, *(getattr(scene.planning, key) for key in ASKED)
+    known = _known.setdefault(scene.object, {})
+    if asked not in known:
+        known[asked] = _automatic_pushes(scene)
+    return known[asked]
+
+
+def _automatic_pushes(scene: Scene) -> Found:
     found: list[PushOption] = []
     refused: list[PushOption] = []
     for stretch in stretches(scene.object.outline):

@@ -72,9 +72,10 @@ class Search:
     def rounds(self) -> Iterator[Way | None]:
         """The best way so far after every round; ends only where there is provably none.
 
-        Two random trees come first, for where there is room. Then two families of lattices take turns, one whose pushes change on the way and one of single pushes, which gets
-        finer for the same work; each level is searched from the start or from the goal, in turns. What they find is
-        polished at once, and the best ways again and again.
+        Two random trees come first, for where there is room. Then two families of lattices take turns, one whose
+        pushes change on the way and one of single pushes, which gets finer for the same work; each level is searched
+        from the start or from the goal, in turns. What they find is polished at once, and the best ways again and
+        again.
         """
         if not self.task.first or not self.task.last:
             return

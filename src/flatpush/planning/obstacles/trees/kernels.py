@@ -40,11 +40,12 @@ def grow(
     if sizes[0] == 1 and sizes[1] == 1:
         for a in range(k):
             left -= 1
-            if first[a] and _joined(T, first, poses, pushes, 0, 0, poses[1, 0], a, buffer, row, here, TRIES):
-                if T[9][LAST + a] > 0.0:
-                    joint[0], joint[1], joint[2] = 0, 0, a
-                    link[:] = row
-                    return left
+            if not first[a] or T[9][LAST + a] == 0.0:
+                continue
+            if _joined(T, first, poses, pushes, 0, 0, poses[1, 0], a, buffer, row, here, WORDS):
+                joint[0], joint[1], joint[2] = 0, 0, a
+                link[:] = row
+                return left
     side = 0
     while left > 0 and sizes[0] < len(poses[0]) and sizes[1] < len(poses[1]):
         left -= 1
