@@ -2,7 +2,6 @@
 
 import math
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -96,11 +95,9 @@ def _run(
     if not (math.isfinite(rate) and rate > 0):
         raise InputError("a rate is positive", key="--rate", value=rate)
     if name == "horizon":
-        try:
-            found = import_module("flatpush.control.horizon").HorizonController
-        except ImportError:
-            raise InputError("the horizon controller is not part of this version", value=name) from None
-        law: Any = found.of(plan, rate=rate, latency=latency, learn=learn)
+        from ..control.horizon import HorizonController
+
+        law: Any = HorizonController.of(plan, rate=rate, latency=latency, learn=learn)
     else:
         sd = (max(eye.position, 1e-5), max(eye.angle, 1e-4))
         gains = Gains.of(frequency, damping)
@@ -112,6 +109,8 @@ def _run(
         scene.object, first.fingers, scene.pusher.tip_radius, friction=friction,
         cof=scene.object.cof + np.array(shift) / 1000,
     )  # fmt: skip
+    # The horizon controller looks, and lands again, as often as it takes.
+    patience = 3 * plan.duration + (200 if name == "horizon" else 10)
     error = np.array([off[0] / 1000, off[1] / 1000, math.radians(off[2])])
     live = sys.stderr.isatty()
 
@@ -122,7 +121,7 @@ def _run(
 
     run = drive(
         law, plant, scene.start_pose + error, _landing(plan, first),
-        SimulatedSensor(eye, np.random.default_rng(seed)), 3 * plan.duration + 10, told=told,
+        SimulatedSensor(eye, np.random.default_rng(seed)), patience, told=told,
     )  # fmt: skip
     if live:
         sys.stderr.write("\n")

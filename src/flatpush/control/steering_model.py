@@ -118,6 +118,10 @@ class SteeringModel:
         return replace(self, flat_point=point, heading=float(np.arctan2(h[1], h[0])))
 
     @cached_property
+    def _drifts(self) -> list[float]:
+        return [] if self.drift is None else [float(x) for x in np.asarray(self.drift).tolist()]
+
+    @cached_property
     def _numbers(self) -> tuple[float, ...]:
         """h, the arm and the flat point as plain numbers: a control step is made of few of numpy's."""
         h, r, z = self.direction, self.arm, self.flat_point
@@ -158,13 +162,14 @@ class SteeringModel:
 
     def across(self, speed: float, omega: float) -> float:
         """Speed of the flat point to its left, of a flat speed and ω [m/s]; see drift."""
-        if self.drift is None or speed <= 0:
+        d = self._drifts
+        if not d or speed <= 0:
             return 0.0
-        place = (omega / speed + self.right) / (self.left + self.right) * (len(self.drift) - 1)
-        place = min(max(place, 0.0), len(self.drift) - 1.000001)
+        last = len(d) - 1
+        place = (omega / speed + self.right) / (self.left + self.right) * last
+        place = 0.0 if place < 0 else place if place < last else last - 1e-6
         k = int(place)
-        d = self.drift
-        return speed * float(d[k] + (place - k) * (d[k + 1] - d[k]))
+        return speed * (d[k] + (place - k) * (d[k + 1] - d[k]))
 
     def twist(self, speed: float, omega: float) -> Array:
         """Body twist in O for a flat speed and ω, shape (3,)."""

@@ -1,0 +1,108 @@
+"""What is known of the steering of every push of one object, and how one push teaches the others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..geometry.pose import Array
+from ..planning.options import PushOption, push_option
+from ..problem import Scene
+from .contact_car import contact_car, drift_of, sides_of
+from .learning import SteeringBelief, SteeringEstimate
+
+# The prior: standard deviations of each coordinate of the centre of friction, by the object's size, and of ρ, by
+# itself.
+SD_COF, SD_RHO = 0.015, 0.15
+# What was learned is used once it knows the heading of the axle so much better than the prior.
+BETTER = 0.9
+# What was learned is not believed farther from the prior than this, by its standard deviations.
+FAR = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Steering:
+    """Of one push; build with steering_of.
+
+    Attributes:
+        cof, rho: centre of friction in O and ρ [m²], as far as is known now: the prior, or what was learned.
+        sides, edges, drift: see contact_car.
+        point: the contact where it lands. belief: what its own motions tell. prior: what was believed before them.
+    """
+
+    cof: Array
+    rho: float
+    sides: tuple[float, float]
+    edges: tuple[float, float]
+    drift: Array | None
+    point: Array
+    belief: SteeringBelief
+    prior: SteeringEstimate
+
+    def observed(self, point: ArrayLike, displacement: ArrayLike, covariance: ArrayLike) -> "Steering":
+        """With a stretch of sticking; see SteeringBelief.observed."""
+        return replace(self, belief=self.belief.observed(point, displacement, covariance))
+
+
+def steering_of(scene: Scene, option: PushOption, edge: float) -> Steering:
+    """The prior of a push, from its cars with the scene's margin and with what feedback leaves of the cone at least."""
+    car, wide = option.car, push_option(scene, option.push, margin=edge).car
+    assert car is not None
+    assert option.placement is not None
+    mu = scene.object.friction
+    rho, sides = sides_of(car, mu, scene.planning.friction_margin)
+    edges = sides
+    if wide is not None:
+        other, edges = sides_of(wide, mu, edge)
+        edges = edges[0] * other / rho, edges[1] * other / rho
+    point, normal = option.placement.points[0], option.placement.normals[0]
+    now = contact_car(
+        point, normal, car.cof, rho, mu, scene.pusher.tip_radius,
+        reserve=scene.planning.friction_margin, edge=edge, sides=sides, edges=edges,
+    )  # fmt: skip
+    drift = None if now is None else drift_of(car if wide is None else wide, now.model)
+    prior = SteeringBelief.prior(car.cof, rho, SD_COF * scene.object.outline.size, SD_RHO * rho)
+    return Steering(car.cof, rho, sides, edges, drift, point, prior, prior.estimate())
+
+
+def shared(pushes: Sequence[Steering], size: float) -> tuple[Steering, ...]:
+    """The same pushes, each knowing what all have seen: they have one centre of friction, and each a ρ of its own.
+
+    Args:
+        size: of the object [m].
+    """
+    gains, pulls = [], []
+    for push in pushes:
+        if push.belief.count == 0:
+            gains.append(np.zeros((2, 2)))
+            pulls.append(np.zeros(2))
+            continue
+        before, after = push.prior, push.belief.estimate()
+        less, more = (np.linalg.inv(e.covariance[:2, :2]) for e in (before, after))
+        gains.append(more - less)
+        pulls.append(more @ after.cof - less @ before.cof)
+    known = []
+    for k, push in enumerate(pushes):
+        belief = push.belief
+        information, pull = belief.information.copy(), belief.information @ belief.before
+        for j in range(len(pushes)):
+            if j != k:
+                information[:2, :2] += gains[j]
+                pull[:2] += pulls[j]
+        told = replace(
+            belief,
+            information=information,
+            before=np.asarray(np.linalg.solve(information, pull), dtype=float),
+        )
+        estimate, prior = told.estimate(), push.prior
+        better = estimate.axle(push.point).heading_sd < BETTER * prior.axle(push.point).heading_sd
+        # A finger that slipped unseen gives nonsense: what lies far outside the prior is not believed.
+        far = float(np.hypot(*(estimate.cof - prior.cof))) > FAR * SD_COF * size
+        far |= abs(estimate.rho - prior.rho) > FAR * SD_RHO * prior.rho
+        known.append(
+            replace(push, cof=estimate.cof, rho=estimate.rho)
+            if better and not far
+            else replace(push, cof=prior.cof, rho=prior.rho)
+        )
+    return tuple(known)
