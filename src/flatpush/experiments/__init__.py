@@ -14,10 +14,11 @@ EXPERIMENTS = {
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
     "cone": "two fingers with their composite cone against their virtual middle contact",
+    "replay": "recorded runs of a robot through the simulator, calibrated and not (--data)",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
 # Those that need the folder of recorded data.
-RECORDED = {"force-pushes"}
+RECORDED = {"force-pushes", "replay"}
 
 
 def experiment(name: str, data: Path | None = None) -> Callable[[Path | None], str]:

@@ -1,0 +1,52 @@
+"""The recorded two-finger runs: what the simulator predicts with nothing fitted, from contacts, and from other runs."""
+
+import numpy as np
+import pytest
+
+from flatpush.experiments import replay
+
+
+@pytest.fixture(scope="module")
+def recorded(data_folder):
+    return replay.recorded(data_folder)
+
+
+def only(recordings, names):
+    return [one for one in recordings if one.run.object in names]
+
+
+def test_every_given_run_is_read_and_halved(recorded):
+    runs, _ = recorded
+    assert [len(only(runs, [name])) for name in replay.NAMES] == [11, 10, 10, 10]
+    assert [len(part) for part in replay.halves(runs)] == [24, 17]
+
+
+def test_with_nothing_fitted(recorded):
+    runs, setup = recorded
+    angular = only(runs, ("bigrect_3pts", "bigrect_ridge", "tri"))
+    found = replay.judged("", "", angular, setup, replay.Parameters())
+    assert found.lost == 0
+    assert found.final[:, 0].mean() <= 1.6e-3
+    assert found.final[:, 0].max() <= 2.6e-3
+    plan = replay.judged("", "", angular, setup, replay.Parameters(), replay._at_goal)
+    assert found.final[:, 0].mean() < plan.final[:, 0].mean()
+
+
+@pytest.mark.slow
+def test_the_contact_alone_calibrates_and_no_end_is_used(recorded):
+    runs, setup = recorded
+    found = replay.contact_calibration(runs, setup)
+    assert found.friction is None
+    judged = replay.judged("", "", runs, setup, found)
+    assert judged.lost == 0
+    assert judged.final[:, 0].mean() <= 1.0e-3
+
+
+@pytest.mark.slow
+def test_what_is_fitted_on_one_half_predicts_the_other(recorded):
+    runs, setup = recorded
+    one, other = replay.halves(runs)
+    judged = replay.judged("", "", other, setup, replay.fitted_on(one, setup))
+    assert judged.final[:, 0].mean() <= 0.6e-3
+    assert judged.final[:, 0].max() <= 1.5e-3
+    assert np.degrees(judged.final[:, 1].mean()) <= 0.5
