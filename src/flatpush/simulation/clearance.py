@@ -66,8 +66,12 @@ class _World:
         self.scene = scene
         self.outline = scene.object.outline
         self.ring = self.outline.vertices
-        self.obstacles = [shapely.Polygon(o) for o in scene.workspace.obstacles]
-        for obstacle in self.obstacles:
+        # A circle is its centre with the radius taken off every distance.
+        self.obstacles = [
+            (shapely.Point(o.centre), o.radius) if o.is_circle else (shapely.Polygon(o.vertices), 0.0)
+            for o in scene.workspace.obstacles
+        ]
+        for obstacle, _ in self.obstacles:
             shapely.prepare(obstacle)
         self.bounds = scene.workspace.bounds
 
@@ -95,14 +99,14 @@ class _World:
         best = self._inside(corners, 0.0)
         if self.obstacles:
             shape = self.shapely.Polygon(corners)
-            best = min(best, *(self._gap(shape, o) for o in self.obstacles))
+            best = min(best, *(self._gap(shape, o) - r for o, r in self.obstacles))
         return best
 
     def _disc(self, centre: Array, radius: float, lifted: bool = False) -> float:
         best = self._inside(centre[None], radius)
         if self.obstacles and not lifted:
             point = self.shapely.Point(centre)
-            best = min(best, *(self._gap(point, o) - radius for o in self.obstacles))
+            best = min(best, *(self._gap(point, o) - radius - r for o, r in self.obstacles))
         return best
 
     def _inside(self, points: Array, radius: float) -> float:

@@ -21,8 +21,8 @@ def check_ends(scene: Scene) -> None:
     """
     for key, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
         _check_bounds(scene, key, pose)
-        for k, corners in enumerate(scene.workspace.obstacles):
-            _check_obstacle(scene, key, pose, k, Outline.polygon(corners))
+        for k, obstacle in enumerate(scene.workspace.obstacles):
+            _check_obstacle(scene, key, pose, k, obstacle)
 
 
 def _check_bounds(scene: Scene, key: str, pose: Array) -> None:
