@@ -1,10 +1,10 @@
 """The first path of one push next to OMPL's RRT: pytest benchmarks/test_obstacles.py -n 0 -s.
 
 OMPL grows its RRT in its Dubins space of the push's flat point, and asks the same compiled clearance test through a
-Python callback, at poses 1 mm apart along every edge; ours decides between them too. Scenes: among boxes, ends in turns;
-in the robot-executed mazes (FLATPUSH_DATA) with one push, from place to place; carved at random along a path of one push.
-Where one of the two finds nothing within its limit, its time counts as the limit or more. Medians are over scenes and
-seeds. Nothing is asserted about time.
+Python callback, at poses 1 mm apart along every edge; ours decides between them too. Scenes: among boxes, from place
+to place; in the robot-executed mazes (FLATPUSH_DATA) likewise; carved at random along a path of one push. Where one of
+the two finds nothing within its limit, its time counts as the limit. Medians are over scenes and seeds. Nothing is
+asserted about time.
 """
 
 import math
@@ -150,13 +150,6 @@ class Ompl:
         began = time.perf_counter()
         self.setup.solve(LIMIT)
         return time.perf_counter() - began if self.setup.haveExactSolutionPath() else np.inf
-
-
-def per_check(asked: Task) -> tuple[float, float]:
-    """Times of a clearance test of a pose, and of an edge of a word of up to three pieces, compiled [s]."""
-    from flatpush.planning.obstacles.studies import check_times
-
-    return check_times(asked)
 
 
 def test_first_path_next_to_ompl():

@@ -288,6 +288,21 @@ CASES: list[tuple[str, dict[str, Any], list[str]]] = [
         ["workspace.obstacles[1]:", "cross"],
     ),
     (
+        "round obstacle without size",
+        {"workspace.obstacles": [{"circle": 0, "centre": [9, 9]}]},
+        ["workspace.obstacles[0].circle: a number greater than 0"],
+    ),
+    (
+        "round obstacle without end",
+        {"workspace.obstacles": [{"circle": float("inf"), "centre": [9, 9]}]},
+        ["workspace.obstacles[0].circle:", "finite"],
+    ),
+    (
+        "round obstacle somewhere",
+        {"workspace.obstacles": [{"circle": 3}]},
+        ["workspace.obstacles[0].centre:"],
+    ),
+    (
         "no such contact of two fingers",
         {"planning": {"two_finger": "cones"}},
         ["planning.two_finger:", "cone", "middle"],

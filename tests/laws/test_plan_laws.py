@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import final_error
 
 import flatpush as fp
+from flatpush.errors import InputError
 from flatpush.geometry import pose_error, transform
 from flatpush.planning import Planner
 from flatpush.steering import words
@@ -174,9 +175,12 @@ def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
     assert around.certificate.clearance >= 0
     assert around.cost > kept.cost
     assert fp.verify(around).ok
-    assert planned(obstacles=[beside], clearance=0.04).certificate.get("clearance", 1.0) >= 0.04
+    assert planned(obstacles=[beside], clearance=0.03).certificate.clearance >= 0.03
+    with pytest.raises(InputError, match=r"30.35 mm from obstacle 0, and 40.00 mm are asked for"):
+        planned(obstacles=[beside], clearance=0.04)
     assert planned(bounds=(-0.08, -0.14, 0.08, 0.08)).status == "solved"
-    assert planned(bounds=(-0.035, -0.14, 0.06, 0.06)).status == "no_plan"
+    with pytest.raises(InputError, match=r"outside the left side of the bounds by 4.33 mm"):
+        planned(bounds=(-0.035, -0.14, 0.06, 0.06))
 
 
 def test_clearance_sees_a_needle_between_samples(triangle):

@@ -18,7 +18,7 @@ def answer(
         start,
         goal,
         fp.Pusher(fingers=2, spacing=0.01),
-        workspace=fp.Workspace(bounds, tuple(np.array(o) for o in obstacles)),
+        workspace=fp.Workspace(bounds, obstacles),
         planning=fp.Planning(clearance=clearance, iterations=1),
     )
     return next(iter(fp.Planner(scene, tree=False).answers()))
@@ -35,6 +35,10 @@ def answer(
         (
             {"start": (0, -0.188, 0), "clearance": 0.005},
             ["2.00 mm from the lower side", "5.00 mm are asked for"],
+        ),
+        (
+            {"obstacles": [fp.Outline.circle(0.02, (0.0, 0.128))]},
+            ["at the goal", "overlaps obstacle 0 by 2.00 mm"],
         ),
         ({"outline": fp.Outline.circle(0.01), "start": (0.195, 0, 0)}, ["right side", "5.00 mm"]),
     ],

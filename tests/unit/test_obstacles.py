@@ -261,10 +261,14 @@ def test_round_objects_and_obstacles(data_folder):
         (0.3, 0.0, 0.5),
         pusher=fp.Pusher(),
         workspace=fp.Workspace(
-            (-0.1, -0.12, 0.4, 0.12), (np.array([(0.1, -0.02), (0.2, -0.03), (0.15, 0.06)]),)
+            (-0.1, -0.12, 0.4, 0.12),
+            (np.array([(0.1, -0.02), (0.2, -0.03), (0.15, 0.06)]), Outline.circle(0.03, (0.22, 0.0))),
         ),
         planning=fp.Planning(time_limit=60, iterations=300),
     )
     plan = fp.Planner(scene, tree=False).plan()
     assert plan.status == "solved"
     assert plan.certificate.clearance >= 0
+    assert fp.verify(plan).ok
+    least = min(np.min(np.hypot(*(s.object[:, :2] - (0.22, 0.0)).T)) for s in plan.pushes)
+    assert 0.05 <= least < 0.1

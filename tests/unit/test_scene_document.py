@@ -67,7 +67,10 @@ def scene_in(units: dict[str, str], per_mm: float, degree: float, **more: Any) -
             "goal": [*lengths([-3, 5]), -90 * degree],
             "workspace": {
                 "bounds": lengths([-200, -100, 200, 100]),
-                "obstacles": [lengths([[80, 0], [90, 0], [85, 9]])],
+                "obstacles": [
+                    lengths([[80, 0], [90, 0], [85, 9]]),
+                    {"circle": lengths(12), "centre": lengths([-40, 70])},
+                ],
             },
             "planning": {
                 "switch_cost": lengths(25),
@@ -103,7 +106,9 @@ def test_every_number_follows_the_units(units: dict[str, str], per_mm: float, de
     np.testing.assert_allclose(scene.start, [0.03, 0.05, np.pi / 4], **close)
     np.testing.assert_allclose(scene.goal, [-0.003, 0.005, -np.pi / 2], **close)
     np.testing.assert_allclose(scene.workspace.bounds, [-0.2, -0.1, 0.2, 0.1], **close)
-    np.testing.assert_allclose(scene.workspace.obstacles[0][2], [0.085, 0.009], **close)
+    corners, disc = scene.workspace.obstacles
+    np.testing.assert_allclose(corners.vertices[2], [0.085, 0.009], **close)
+    np.testing.assert_allclose([disc.radius, *disc.centre], [0.012, -0.04, 0.07], **close)
     plan = scene.planning
     np.testing.assert_allclose(plan.goal_tolerance, [0.001, 0.002, np.pi / 60], **close)
     np.testing.assert_allclose([plan.switching, plan.clearance], [0.025, 0.004], **close)
@@ -229,9 +234,9 @@ def assert_same(a: Scene, b: Scene) -> None:
     assert np.array_equal(a.start_pose, b.start_pose)
     assert np.array_equal(a.goal_pose, b.goal_pose)
     assert a.workspace.bounds == b.workspace.bounds
-    assert all(
-        np.array_equal(x, y) for x, y in zip(a.workspace.obstacles, b.workspace.obstacles, strict=True)
-    )
+    for x, y in zip(a.workspace.obstacles, b.workspace.obstacles, strict=True):
+        assert np.array_equal(x.vertices, y.vertices)
+        assert (*x.centre, x.radius) == (*y.centre, y.radius)
     for p, q in zip(a.pushes, b.pushes, strict=True):
         if isinstance(p, Push) and isinstance(q, Push):
             assert (p.name, p.fingers, p.spacing, p.at.edge, p.at.along) == (
@@ -356,7 +361,7 @@ def test_the_template_loads_and_names_every_key(tmp_path: Path) -> None:
     # Also what stands in comments is right.
     active = scene_template().replace("# workspace:", "workspace:").replace("#   ", "  ")
     path.write_text(active)
-    assert len(load_scene(path).workspace.obstacles) == 1
+    assert len(load_scene(path).workspace.obstacles) == 2
 
 
 def test_the_template_states_the_defaults() -> None:

@@ -242,7 +242,7 @@ def test_a_simulated_run_is_drawn_in_red(tmp_path):
 
 def test_obstacles_and_bounds_are_drawn(tmp_path):
     square = np.array([[0.1, 0.1], [0.15, 0.1], [0.15, 0.15], [0.1, 0.15]])
-    plan = make_plan(bounds=(-0.3, -0.3, 0.3, 0.3), obstacles=(square,))
+    plan = make_plan(bounds=(-0.3, -0.3, 0.3, 0.3), obstacles=(square, Outline.circle(0.03, (-0.2, 0.1))))
     text = svg_of(plan, tmp_path)
     assert "#c1272d" in text
     assert "#3b6fb6" in text

@@ -106,6 +106,13 @@ class CirclePart(Part):
     centre: Point = Field(default=[0.0, 0.0], description="A point [x, y]; the origin if left out.")
 
 
+class RoundObstaclePart(Part):
+    """A round obstacle."""
+
+    circle: Positive = Field(description="A radius, greater than 0.")
+    centre: Point = Field(description="A point [x, y].")
+
+
 class ShapeFilePart(Part):
     """A drawing, by its path relative to this file."""
 
@@ -173,6 +180,10 @@ OutlineForm = Annotated[
     | Annotated[CirclePart, Tag("<circle>")]
     | Annotated[ShapeFilePart, Tag("<file>")],
     *forms("an outline", (("circle",), ("file",)), listed="corners"),
+]
+ObstacleForm = Annotated[
+    Annotated[list[Point], Tag("<corners>")] | Annotated[RoundObstaclePart, Tag("<circle>")],
+    *forms("an obstacle", (("circle",),), listed="corners", others=("centre",)),
 ]
 SupportForm = Annotated[
     Annotated[Literal["uniform", "outline"], Tag("<word>")]
@@ -273,8 +284,9 @@ class WorkspacePart(Part):
     bounds: Annotated[list[Number], Field(min_length=4, max_length=4)] | None = Field(
         default=None, description="[xmin, ymin, xmax, ymax]."
     )
-    obstacles: list[list[Point]] = Field(
-        default=[], description="A list of polygons, each a list of [x, y] corners."
+    obstacles: list[ObstacleForm] = Field(
+        default=[],
+        description="A list of obstacles, each a list of [x, y] corners or {circle: r, centre: [x, y]}.",
     )
 
 

@@ -141,9 +141,12 @@ def _pusher(ctx: Context, part: m.PusherPart) -> Pusher:
 
 def _workspace(ctx: Context, part: m.WorkspacePart, obj: Object) -> Workspace:
     obstacles = []
-    for i, corners in enumerate(part.obstacles):
+    for i, form in enumerate(part.obstacles):
         with ctx.at(join("workspace.obstacles", i)):
-            obstacles.append(Outline.polygon(open_polygon(ctx.lengths(corners))).vertices)
+            if isinstance(form, m.RoundObstaclePart):
+                obstacles.append(Outline.circle(form.circle / ctx.per_metre, ctx.lengths(form.centre)))
+            else:
+                obstacles.append(Outline.polygon(open_polygon(ctx.lengths(form))))
     if part.bounds is None:
         return Workspace(None, tuple(obstacles))
     xmin, ymin, xmax, ymax = ctx.lengths(part.bounds).tolist()

@@ -55,7 +55,10 @@ def scene_document(scene: Scene) -> dict[str, Any]:
     if scene.workspace.bounds is not None:
         workspace["bounds"] = [float(x) for x in scene.workspace.bounds]
     if len(scene.workspace.obstacles):
-        workspace["obstacles"] = [[[float(x), float(y)] for x, y in o] for o in scene.workspace.obstacles]
+        workspace["obstacles"] = [
+            {"circle": float(o.radius), "centre": o.centre.tolist()} if o.is_circle else o.vertices.tolist()
+            for o in scene.workspace.obstacles
+        ]
     if workspace:
         document["workspace"] = workspace
     document["planning"] = {

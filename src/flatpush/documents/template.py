@@ -51,7 +51,7 @@ goal: [0, 0, 0]
 # Where object and pusher must stay:
 # workspace:
 #   bounds: [-225, -127, 225, 127]              # xmin, ymin, xmax, ymax
-#   obstacles: [[[80, 60], [120, 60], [120, 90]]]
+#   obstacles: [[[80, 60], [120, 60], [120, 90]], {circle: 20, centre: [-60, 80]}]
 
 # How to plan; every key may be left out, and the values here are the defaults.
 planning:

@@ -15,6 +15,7 @@ EXPERIMENTS = {
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
     "cone": "two fingers with their composite cone against their virtual middle contact",
     "replay": "recorded runs of a robot through the simulator, calibrated and not (--data)",
+    "crowded": "scenes full of obstacles, from a narrow passage to two hundred obstacles",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
 # Those that need the folder of recorded data.

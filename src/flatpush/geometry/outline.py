@@ -79,7 +79,10 @@ class Outline:
         """A circle of the given radius [m]."""
         if not (np.isfinite(radius) and radius > 0):
             raise InputError("the radius of a circle is positive and finite", value=radius)
-        return cls(np.empty((0, 2)), np.array(centre, dtype=float), float(radius))
+        middle = np.array(centre, dtype=float)
+        if middle.shape != (2,) or not np.all(np.isfinite(middle)):
+            raise InputError("the centre of a circle is a point [x, y] of finite numbers", value=centre)
+        return cls(np.empty((0, 2)), middle, float(radius))
 
     @property
     def is_circle(self) -> bool:

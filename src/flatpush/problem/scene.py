@@ -120,10 +120,42 @@ class Push:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """Where object and pusher must stay: bounds (xmin, ymin, xmax, ymax) and obstacles, simple polygons [m]."""
+    """Where object and pusher must stay.
+
+    Attributes:
+        bounds: (xmin, ymin, xmax, ymax) [m], or None.
+        obstacles: outlines, polygons or circles, in W; built from them or from the corners of simple polygons,
+            shape (n, 2) [m].
+
+    >>> Workspace((0, 0, 1, 1), (Outline.circle(0.1, (0.5, 0.5)), [(0, 0), (0.2, 0), (0, 0.2)])).obstacles[1].area
+    0.02...
+
+    Raises:
+        InputError: for bounds that enclose no area, and corners that are no simple polygon.
+    """
 
     bounds: tuple[float, float, float, float] | None = None
-    obstacles: tuple[Array, ...] = ()
+    obstacles: Sequence[Outline] = ()
+
+    def __post_init__(self) -> None:
+        if self.bounds is not None:
+            sides = np.array(self.bounds, dtype=float)
+            if sides.shape != (4,) or not np.all(np.isfinite(sides)) or np.any(sides[:2] >= sides[2:]):
+                raise InputError(
+                    "the bounds enclose an area",
+                    key="workspace.bounds",
+                    value=self.bounds,
+                    hint="Their order is [xmin, ymin, xmax, ymax].",
+                )
+        outlines = []
+        for k, obstacle in enumerate(self.obstacles):
+            try:
+                outlines.append(obstacle if isinstance(obstacle, Outline) else Outline.polygon(obstacle))
+            except InputError as error:
+                raise InputError(
+                    error.rule, key=f"workspace.obstacles[{k}]", value=error.value, hint=error.hint
+                ) from None
+        object.__setattr__(self, "obstacles", tuple(outlines))
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def _still(
             f'<rect class="bounds" x="{x0:.2f}" y="{-y1:.2f}" width="{x1 - x0:.2f}" height="{y1 - y0:.2f}"/>'
         )
     parts += [
-        f'<path class="obstacle" d="{_path(obstacle, closed=True)}"/>'
+        f'<path class="obstacle" d="{_path(obstacle.polyline(), closed=True)}"/>'
         for obstacle in scene.workspace.obstacles
     ]
     for trace in traces:

@@ -53,7 +53,8 @@ def view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollout
     """What the drawing must show, with a border: xmin, ymin, xmax, ymax [mm]."""
     scene = plan.scene
     tip = scene.pusher.tip_radius
-    shown = [_outline(scene, scene.start_pose), _outline(scene, scene.goal_pose), *scene.workspace.obstacles]
+    shown = [_outline(scene, scene.start_pose), _outline(scene, scene.goal_pose)]
+    shown += [obstacle.polyline() for obstacle in scene.workspace.obstacles]
     if scene.workspace.bounds is not None:
         shown.append(np.reshape(scene.workspace.bounds, (2, 2)))
     for trace in traces:
@@ -79,7 +80,7 @@ def draw_workspace(axes: Any, scene: Scene) -> None:
             )
         )
     for obstacle in scene.workspace.obstacles:
-        corners = MM * np.asarray(obstacle)
+        corners = MM * obstacle.polyline()
         axes.add_patch(Polygon(corners, facecolor=palette.OBSTACLE, alpha=0.16, linewidth=0, zorder=1))
         axes.add_patch(
             Polygon(corners, fill=False, edgecolor=palette.OBSTACLE, hatch="////", linewidth=1.0, zorder=1)

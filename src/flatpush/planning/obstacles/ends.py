@@ -19,10 +19,13 @@ def check_ends(scene: Scene) -> None:
     Raises:
         InputError: names the end, the side or the obstacle (numbered as listed, from 0), and by how much.
     """
+    body, every = Body.of(scene.object.outline), World.of(None, scene.workspace.obstacles)
     for key, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
         _check_bounds(scene, key, pose)
-        for k, corners in enumerate(scene.workspace.obstacles):
-            _check_obstacle(scene, key, pose, k, Outline.polygon(corners))
+        if pose_clearance(every, body, pose) >= scene.planning.clearance - TOUCHING:
+            continue
+        for k, obstacle in enumerate(scene.workspace.obstacles):
+            _check_obstacle(scene, key, pose, k, obstacle)
 
 
 def _check_bounds(scene: Scene, key: str, pose: Array) -> None:
