@@ -191,7 +191,7 @@ def _refusal(bad: Sequence[BadRow], source: str) -> InputError:
     return InputError(
         f"{len(bad)} row{'s' if len(bad) > 1 else ''} cannot be used: {named}{more}",
         source=source,
-        hint="Correct the file, or leave such rows out (skip_bad).",
+        hint="Correct the file, or leave such rows out: load_robot_log(path, skip_bad=True).",
     )
 
 

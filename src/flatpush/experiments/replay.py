@@ -86,12 +86,14 @@ def recorded(data: Path) -> tuple[tuple[Recording, ...], Setup]:
     folder = data / "robot_exp_logs"
     shape = data / "plan_graph" / "shape_butterfly.csv"
     runs = {name: logged(folder, name) for name in NAMES}
-    missing = [
-        f"{folder / f'log_{name}.csv'} (or raw logs in {folder / name})" for name in NAMES if not runs[name]
-    ]
-    missing += [] if shape.is_file() else [str(shape)]
+    missing = [f"{folder.name}/log_{name}.csv" for name in NAMES if not runs[name]]
+    missing += [] if shape.is_file() else [f"{shape.parent.name}/{shape.name}"]
     if missing:
-        raise InputError("recorded runs are missing", source=", ".join(missing))
+        raise InputError(
+            f"recorded runs are missing: {', '.join(missing)}",
+            source=str(data),
+            hint=f"Raw logs are read from {folder.name}/OBJECT/START/RUN.txt, as tri/1/1.txt.",
+        )
     return tuple(Recording.of(run) for name in NAMES for run in runs[name]), setup(shape)
 
 
