@@ -79,3 +79,14 @@ def test_every_file_and_test_that_the_documents_name_exists():
             if not (home.exists() or (module / parts[-1]).is_dir() or named):
                 missing.append((page.name, name))
     assert not missing
+
+
+def test_no_sentence_of_the_documents_is_cut():
+    """Brackets and emphasis close within their paragraph, item or row."""
+    cut = []
+    for page in [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        words = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+        for part in re.split(r"\n(?=[*|#]|\n)", re.sub(r"`[^`]*`", "", words)):
+            if part.count("(") != part.count(")") or part.count("**") % 2:
+                cut.append((page.name, part))
+    assert not cut
