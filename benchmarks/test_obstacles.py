@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parent)]
 from tests.maze import MAZE_A, MAZE_B, stored_task
 
 from flatpush.geometry import Outline, compose, inverse
