@@ -272,3 +272,23 @@ def test_round_objects_and_obstacles(data_folder):
     assert fp.verify(plan).ok
     least = min(np.min(np.hypot(*(s.object[:, :2] - (0.22, 0.0)).T)) for s in plan.pushes)
     assert 0.05 <= least < 0.1
+
+
+def test_tidy_ways_have_fewer_pieces_and_cost_hardly_more(task):
+    from flatpush.planning.obstacles import tidied
+
+    fewer = 0
+    for way in (trees.way for trees in (Trees(task, seed) for seed in range(8)) if trees.way is not None):
+        tidy = tidied(task, way)
+        check_way(task, tidy)
+        gone = len(way.pieces) - len(tidy.pieces)
+        assert gone >= 0
+        assert tidy.pushes == way.pushes
+        assert tidy.cost <= way.cost * (1 + 5e-4 * gone) + 1e-12
+        fewer += gone
+    assert fewer > 0
+    # A needless wiggle on a straight way becomes the straight way again.
+    near = Way.of(
+        task.fleet, task.start, [(1, 1, 0.01), (1, 0, 1e-3), (1, 2, 1e-3), (1, 0, 1e-3), (1, 1, 0.004)]
+    )
+    assert len(tidied(task, near).pieces) <= 3
