@@ -1,6 +1,8 @@
 """The search among obstacles: its kernels against plain code, its ways against dense samples, what it says if none."""
 
+import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -140,6 +142,18 @@ def test_the_robot_maze_is_solved_and_improved(task, seed):
 def test_same_seed_and_work_same_way(task):
     one, two = searched(task, 5, 40_000), searched(task, 5, 40_000)
     assert one.best.pieces == two.best.pieces
+
+
+def test_every_stored_maze_is_solved_and_cheaper_than_its_stored_plan(data_folder):
+    """All twelve, read from their files; the stored plans of some of them touch the walls."""
+    stored = json.loads((data_folder / "maze" / "stored_paths_clearance_check.json").read_text())
+    assert len(stored) == 12
+    for row in stored:
+        task = stored_task(data_folder, row["maze"], need=NEED)
+        search = searched(task, 0, 20_000)
+        check_way(task, search.best)
+        changes = sum(a != b for a, b in pairwise(row["actions"]))
+        assert search.cost < row["total_length_m"] + changes * task.fleet.switching.max()
 
 
 @pytest.mark.slow
