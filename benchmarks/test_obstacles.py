@@ -3,8 +3,8 @@
 OMPL grows its RRT in its Dubins space of the push's flat point, and asks the same compiled clearance test through a
 Python callback, at poses 1 mm apart along every edge; ours decides between them too. Scenes: among boxes, from place
 to place; in the robot-executed mazes (FLATPUSH_DATA) likewise; carved at random along a path of one push. Where one of
-the two finds nothing within its limit, its time counts as the limit. Medians are over scenes and seeds. Nothing is
-asserted about time.
+the two finds nothing within its limit, its time counts as the limit; where both find nothing, there may be no path, and
+the pair is left out. Medians are over scenes and seeds. Nothing is asserted about time.
 """
 
 import math
@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
 from tests.maze import MAZE_A, MAZE_B, stored_task
 
 from flatpush.geometry import Outline, compose, inverse
@@ -165,9 +166,11 @@ def test_first_path_next_to_ompl():
     for name, tasks in every.items():
         a, b = [], []
         for asked in tasks:
-            asked.arrays  # noqa: B018  (what OMPL's set-up is not timed for either)
             for seed in range(SEEDS):
-                a.append(ours(asked, seed))
+                # Nothing of one run serves the next, but the arrays, as OMPL's set-up is not timed either.
+                afresh = replace(asked)
+                afresh.arrays  # noqa: B018
+                a.append(ours(afresh, seed))
                 util.RNG.setSeed(seed + 1)
                 theirs = Ompl(asked, SPACING)
                 b.append(theirs.first())
@@ -182,7 +185,8 @@ def test_first_path_next_to_ompl():
 
 def _line(name, a, b):
     solved = f"solved {np.sum(np.isfinite(a))} and {np.sum(np.isfinite(b))} of {len(a)}"
-    a, b = np.minimum(a, LIMIT), np.minimum(b, LIMIT)
+    either = np.isfinite(a) | np.isfinite(b)
+    a, b = np.minimum(a, LIMIT)[either], np.minimum(b, LIMIT)[either]
     return (
         f"{name}: ours {1e3 * np.median(a):.2f} ms, OMPL {1e3 * np.median(b):.1f} ms to the first path in the median,"
         f" {np.median(b) / np.median(a):.0f} times; pair by pair {np.median(b / a):.0f} times; {solved}"

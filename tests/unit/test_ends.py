@@ -11,7 +11,13 @@ BOUNDS = (-0.2, -0.2, 0.2, 0.2)
 
 
 def answer(
-    start=(0, 0, 0), goal=(0, 0.1, 0), clearance=0.0, obstacles=(BLOCK,), bounds=BOUNDS, outline=SQUARE
+    start=(0, 0, 0),
+    goal=(0, 0.1, 0),
+    clearance=0.0,
+    obstacles=(BLOCK,),
+    bounds=BOUNDS,
+    outline=SQUARE,
+    **planning,
 ):
     scene = fp.Scene(
         fp.Object(outline),
@@ -19,7 +25,7 @@ def answer(
         goal,
         fp.Pusher(fingers=2, spacing=0.01),
         workspace=fp.Workspace(bounds, obstacles),
-        planning=fp.Planning(clearance=clearance, iterations=1),
+        planning=fp.Planning(clearance=clearance, iterations=1, **planning),
     )
     return next(iter(fp.Planner(scene, tree=False).answers()))
 
@@ -54,6 +60,11 @@ def test_a_cross_is_an_overlap_although_no_corner_is_inside():
     bar = [(-0.1, -0.005), (0.1, -0.005), (0.1, 0.005), (-0.1, 0.005)]
     with pytest.raises(fp.InputError, match="obstacle 1"):
         answer(obstacles=(BLOCK, bar))
+
+
+def test_robust_plans_are_refused_rather_than_forgotten():
+    with pytest.raises(fp.InputError, match="robust plans are made on an empty table only"):
+        answer(robust=True)
 
 
 def test_touching_is_allowed():

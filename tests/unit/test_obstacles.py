@@ -1,6 +1,8 @@
 """The search among obstacles: its kernels against plain code, its ways against dense samples, what it says if none."""
 
+import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -142,6 +144,18 @@ def test_same_seed_and_work_same_way(task):
     assert one.best.pieces == two.best.pieces
 
 
+def test_every_stored_maze_is_solved_and_cheaper_than_its_stored_plan(data_folder):
+    """All twelve, read from their files; the stored plans of some of them touch the walls."""
+    stored = json.loads((data_folder / "maze" / "stored_paths_clearance_check.json").read_text())
+    assert len(stored) == 12
+    for row in stored:
+        task = stored_task(data_folder, row["maze"], need=NEED)
+        search = searched(task, 0, 20_000)
+        check_way(task, search.best)
+        changes = sum(a != b for a, b in pairwise(row["actions"]))
+        assert search.cost < row["total_length_m"] + changes * task.fleet.switching.max()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [MAZE_A, MAZE_B])
 def test_narrow_passages_of_the_robot_mazes_are_found(data_folder, name):
@@ -272,3 +286,23 @@ def test_round_objects_and_obstacles(data_folder):
     assert fp.verify(plan).ok
     least = min(np.min(np.hypot(*(s.object[:, :2] - (0.22, 0.0)).T)) for s in plan.pushes)
     assert 0.05 <= least < 0.1
+
+
+def test_tidy_ways_have_fewer_pieces_and_cost_hardly_more(task):
+    from flatpush.planning.obstacles import tidied
+
+    fewer = 0
+    for way in (trees.way for trees in (Trees(task, seed) for seed in range(8)) if trees.way is not None):
+        tidy = tidied(task, way)
+        check_way(task, tidy)
+        gone = len(way.pieces) - len(tidy.pieces)
+        assert gone >= 0
+        assert tidy.pushes == way.pushes
+        assert tidy.cost <= way.cost * (1 + 5e-4 * gone) + 1e-12
+        fewer += gone
+    assert fewer > 0
+    # A needless wiggle on a straight way becomes the straight way again.
+    near = Way.of(
+        task.fleet, task.start, [(1, 1, 0.01), (1, 0, 1e-3), (1, 2, 1e-3), (1, 0, 1e-3), (1, 1, 0.004)]
+    )
+    assert len(tidied(task, near).pieces) <= 3

@@ -27,9 +27,10 @@ from flatpush.problem import (
     TransitSegment,
     Workspace,
 )
-from flatpush.view import PushSketch, check_figure, describe_figure, save_figure
+from flatpush.view import PushSketch, check_figure, describe_figure, save_figure, save_snapshots
 from flatpush.view.canvas import drawing_style, legend_below, new_figure
 from flatpush.view.sketch import _sense
+from flatpush.view.snapshots import moments
 from flatpush.view.timeline import Timeline, doing
 from flatpush.view.trace import fingertips, rollout_paths, trace_pushes
 
@@ -443,3 +444,42 @@ def test_sketches_are_refused_in_other_formats_and_without_a_push(tmp_path):
         describe_figure(make_plan().scene, [sketch()], tmp_path / "pushes.gif")
     with pytest.raises(InputError, match="at least one push"):
         describe_figure(make_plan().scene, [], tmp_path / "pushes.svg")
+
+
+def test_the_search_tree_is_drawn_faintly_beneath(tmp_path):
+    plan = make_plan()
+    edges = np.cumsum(np.full((1500, 7, 2), 1e-3), axis=1)
+    save_figure(plan, tmp_path / "plain.svg")
+    save_figure(plan, tmp_path / "tree.svg", explored=edges)
+    save_figure(plan, tmp_path / "none.svg", explored=edges[:0])
+    plain, tree, none = (
+        (tmp_path / f"{n}.svg").read_text(encoding="utf-8") for n in ("plain", "tree", "none")
+    )
+    assert plain == none
+    assert plain.count("LineCollection") < tree.count("LineCollection")
+    assert tree.count("#8a93a0") - plain.count("#8a93a0") in range(700, 1000)
+
+
+@pytest.mark.parametrize("ending", [".svg", ".png"])
+def test_snapshots_show_moments_from_start_to_end(tmp_path, ending):
+    plan = make_plan(pushes=2)
+    path = tmp_path / f"moments{ending}"
+    save_snapshots(plan, path, count=6)
+    if ending == ".svg":
+        drawn = path.read_text(encoding="utf-8")
+        assert len(set(re.findall(r'id="(axes_\d+)"', drawn))) == 6
+    else:
+        with Image.open(path) as image:
+            assert image.width == 1200
+    with pytest.raises(InputError, match="start and the end"):
+        save_snapshots(plan, path, count=1)
+    with pytest.raises(InputError, match="ends in"):
+        save_snapshots(plan, tmp_path / "moments.gif")
+
+
+def test_moments_share_the_way_evenly():
+    timeline = Timeline.of(make_plan(pushes=2))
+    times = moments(timeline, 5)
+    assert times[0] == 0.0
+    assert times[-1] == pytest.approx(timeline.duration)
+    assert np.all(np.diff(times) > 0)

@@ -47,8 +47,10 @@ def growth_text(growth: float) -> str:
 
 
 def cost_text(cost: float, kind: str) -> str:
-    """A cost in its unit."""
-    return f"{cost:.2f} s" if kind == "time" else f"{1000 * cost:.1f} mm"
+    """A cost in its unit; one that would round to nothing is said to be smaller than the last digit."""
+    if kind == "time":
+        return "<0.01 s" if 0 < cost < 0.005 else f"{cost:.2f} s"
+    return "<0.1 mm" if 0 < cost < 0.00005 else f"{1000 * cost:.1f} mm"
 
 
 def print_json(value: Any) -> None:

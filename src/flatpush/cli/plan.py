@@ -2,6 +2,7 @@
 
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,9 @@ def command(
     scene: Annotated[Path, typer.Argument(help="Scene document, YAML or JSON.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Write the plan here (JSON).")] = None,
     figure: Annotated[Path | None, typer.Option(help="Draw it: .svg, .png, .gif or .html.")] = None,
+    snapshots: Annotated[
+        Path | None, typer.Option(help="Draw moments of it side by side: .svg or .png.")
+    ] = None,
     start: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
     goal: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
     model: Annotated[str | None, typer.Option(help="exact, ellipsoid, local or quartic.")] = None,
@@ -42,14 +46,18 @@ def command(
         },
     }
     asked = load_scene(scene, {key: value for key, value in overrides.items() if value})
-    for path in (output, figure):
+    for path in (output, figure, snapshots):
         if path is not None:
             check_writable(path)
     if figure is not None:
         from ..view import check_figure
 
         check_figure(figure)
-    found = _planned(asked, tree)
+    if snapshots is not None:
+        from ..view import check_snapshots
+
+        check_snapshots(snapshots)
+    found, explored = _planned(asked, tree)
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))
@@ -70,18 +78,24 @@ def command(
         from ..view import save_figure
 
         with telling("drawing"):
-            save_figure(found, figure)
+            save_figure(found, figure, explored=explored)
+    if snapshots is not None:
+        from ..view import save_snapshots
+
+        with telling("drawing"):
+            save_snapshots(found, snapshots)
     if as_json:
         print_json(plan_document(found))
         return 0
-    _tell(found, output, figure)
+    _tell(found, (output, figure, snapshots))
     return 0
 
 
-def _planned(scene: Any, tree: Path | None) -> Any:
-    """The best plan found. Ctrl-C ends the search; what has been found by then is kept.
+def _planned(scene: Any, tree: Path | None) -> tuple[Any, Any]:
+    """The best plan found, and the edges of the search tree or None.
 
-    Among obstacles a line on a terminal shows how far the search is.
+    Ctrl-C ends the search; what has been found by then is kept. Among obstacles a line on a
+    terminal shows how far the search is.
     """
     from ..planning import Planner
 
@@ -98,7 +112,8 @@ def _planned(scene: Any, tree: Path | None) -> Any:
 
     try:
         with telling("planning (the first run compiles for some seconds)"):
-            for answer in Planner(scene, tree or False, progress if live else None).answers():
+            planner = Planner(scene, tree or False, progress if live else None)
+            for answer in planner.answers():
                 best = answer
     except KeyboardInterrupt:
         if best is None or math.isinf(best.cost):
@@ -108,10 +123,10 @@ def _planned(scene: Any, tree: Path | None) -> Any:
         if shown > 0:
             sys.stderr.write("\n")
     assert best is not None  # there is always an answer
-    return best.plan()
+    return best.plan(), planner.explored
 
 
-def _tell(plan: Any, output: Path | None, figure: Path | None) -> None:
+def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     scene, certificate = plan.scene, plan.certificate
     typer.echo(f"{scene.object.name}: {pose_text(scene.start)} → {pose_text(scene.goal)}")
     if not plan.segments:
@@ -150,6 +165,6 @@ def _tell(plan: Any, output: Path | None, figure: Path | None) -> None:
         )
     for warning in certificate.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    for path in (output, figure):
+    for path in written:
         if path is not None:
             typer.echo(f"wrote {path}")

@@ -13,7 +13,7 @@ from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Leg, Segments, assemble
-from .obstacles import Search, Way, careful, legs_of, obstructions, task_of, way_of
+from .obstacles import Search, Way, careful, legs_of, obstructions, task_of, tidied, way_of
 from .options import PushOption
 from .segments import SAG
 from .transits import Transits
@@ -114,6 +114,9 @@ class Around:
     def _checked(self, way: Way, began: float) -> tuple[float, Segments, dict[str, Any]] | None:
         """The plan of a way, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.planning.clearance
+        tidy = tidied(self.task, way)
+        # Fewer pieces may cost a little; still every answer is cheaper than the one before.
+        way = tidy if tidy.cost < self.best else way
         try:
             segments = assemble(scene, self.transits, legs_of(way, self.options))
         except FlatpushError as error:

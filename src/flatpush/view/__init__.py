@@ -2,5 +2,13 @@
 
 from .describe import PushSketch, describe_figure
 from .figure import check_figure, save_figure
+from .snapshots import check_snapshots, save_snapshots
 
-__all__ = ["PushSketch", "check_figure", "describe_figure", "save_figure"]
+__all__ = [
+    "PushSketch",
+    "check_figure",
+    "check_snapshots",
+    "describe_figure",
+    "save_figure",
+    "save_snapshots",
+]

@@ -5,18 +5,22 @@ from pathlib import Path
 
 from ..documents.atomic import write_atomically
 from ..errors import InputError
+from ..geometry.pose import Array
 from ..problem import Plan, Rollout
 
 ENDINGS = (".svg", ".png", ".gif", ".html")
 
 
-def save_figure(plan: Plan, path: str | Path, rollouts: Sequence[Rollout] = ()) -> None:
+def save_figure(
+    plan: Plan, path: str | Path, rollouts: Sequence[Rollout] = (), explored: Array | None = None
+) -> None:
     """Draws a plan into a file, whole or not at all.
 
     Args:
         plan: solved or not; without a plan the figure shows start, goal and the reason.
         path: ends in .svg or .png (a picture), .gif (an animation) or .html (one to play with, in one file).
         rollouts: simulated runs of this plan, drawn over it in red dashes.
+        explored: paths of the search tree (Planner.explored), drawn faintly into a picture.
 
     Raises:
         InputError: if the ending is another, or the file cannot be written.
@@ -34,7 +38,7 @@ def save_figure(plan: Plan, path: str | Path, rollouts: Sequence[Rollout] = ()) 
     else:
         from .plan_figure import draw_plan
 
-        content = draw_plan(plan, ending, rollouts)
+        content = draw_plan(plan, ending, rollouts, explored)
     write_atomically(path, content)
 
 
@@ -44,7 +48,12 @@ def check_figure(path: str | Path) -> None:
     Raises:
         InputError: if the ending is none of save_figure's, or the folder does not exist.
     """
-    check_ending(path, ENDINGS)
+    check_figure_at(path, ENDINGS)
+
+
+def check_figure_at(path: str | Path, endings: tuple[str, ...]) -> None:
+    """The same for a figure with other endings."""
+    check_ending(path, endings)
     target = Path(path)
     if target.is_dir():
         raise InputError("this is a folder, not a file", source=str(path))

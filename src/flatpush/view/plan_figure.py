@@ -26,17 +26,28 @@ from .trace import PushTrace, fingertips, orientation_mark, rollout_paths, trace
 from .words import plan_subtitle, plan_title, push_label
 
 MM = 1e3
+TREE = "#8a93a0"
+MOST_EDGES = 900  # of the search tree that are drawn
 
 
-def draw_plan(plan: Plan, extension: str, rollouts: Sequence[Rollout] = ()) -> bytes:
-    """The picture of a plan as ".png" or ".svg", with simulated runs drawn over it in red dashes."""
+def draw_plan(
+    plan: Plan, extension: str, rollouts: Sequence[Rollout] = (), explored: Array | None = None
+) -> bytes:
+    """The picture of a plan as ".png" or ".svg", with simulated runs over it in red dashes, and the search tree.
+
+    Args:
+        explored: paths of the tree's edges, shape (m, k, 2) [m], drawn faintly beneath everything.
+    """
+    tree = explored is not None and len(explored) > 0
     with drawing_style():
         figure = new_figure()
         axes = table_axes(figure.add_subplot())
         traces = trace_pushes(plan)
         headline(figure, plan_title(plan), plan_subtitle(plan))
-        _legend(figure, plan, traces, bool(rollouts))
+        _legend(figure, plan, traces, bool(rollouts), tree)
         settle(figure, [(axes, view_box(plan, traces, rollouts))])
+        if explored is not None and tree:
+            _draw_tree(axes, explored)
         draw_workspace(axes, plan.scene)
         for trace in traces:
             _draw_push(axes, plan, trace)
@@ -148,6 +159,16 @@ def draw_fingers(
         )
 
 
+def _draw_tree(axes: Any, explored: Array) -> None:
+    """Edges of the search tree, by the path of the centre of friction; some of them where there are many."""
+    from matplotlib.collections import LineCollection
+
+    some = MM * explored[:: max(1, -(-len(explored) // MOST_EDGES))]
+    axes.add_collection(
+        LineCollection(list(some), colors=TREE, linewidths=0.5, alpha=0.4, zorder=0.9), autolim=False
+    )
+
+
 def _draw_push(axes: Any, plan: Plan, trace: PushTrace) -> None:
     scene, colour = plan.scene, palette.push_colour(trace.number)
     last = len(trace.marks) - 1
@@ -239,7 +260,9 @@ def _draw_rollout(
     axes.plot(*np.concatenate([corners, corners[:1]]).T, linewidth=1.3, zorder=8, **look)
 
 
-def _legend(figure: Any, plan: Plan, traces: Sequence[PushTrace], simulated: bool) -> None:
+def _legend(
+    figure: Any, plan: Plan, traces: Sequence[PushTrace], simulated: bool, tree: bool = False
+) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -301,6 +324,8 @@ def _legend(figure: Any, plan: Plan, traces: Sequence[PushTrace], simulated: boo
                 facecolor=palette.OBSTACLE + "29", edgecolor=palette.OBSTACLE, hatch="////", label="obstacle"
             )
         )
+    if tree:
+        entries.append(Line2D([], [], color=TREE, linewidth=0.8, label="search tree"))
     if simulated:
         entries.append(
             Line2D([], [], color=palette.SIMULATED, linestyle=(0, (4, 2)), linewidth=1.3, label="simulated")

@@ -10,5 +10,17 @@ from .ends import check_ends
 from .path import Way
 from .search import Search
 from .task import Task
+from .tidy import tidied
 
-__all__ = ["Search", "Task", "Way", "careful", "check_ends", "legs_of", "obstructions", "task_of", "way_of"]
+__all__ = [
+    "Search",
+    "Task",
+    "Way",
+    "careful",
+    "check_ends",
+    "legs_of",
+    "obstructions",
+    "task_of",
+    "tidied",
+    "way_of",
+]

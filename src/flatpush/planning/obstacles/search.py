@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -48,8 +49,12 @@ class Search:
         self.finest = np.inf
         self.chains: list[Chain] = []
         self.closed, self.disc, self.direct = False, 0.0, False
-        self._rng = np.random.default_rng(seed)
+        self._seed = seed
         self._drawn: Lattice | None = None
+
+    @cached_property
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng(self._seed)
 
     def prepare(self) -> None:
         """Compiles, or loads what was compiled, so that it is not the search's time."""
@@ -60,7 +65,9 @@ class Search:
         near = replace(
             self.task, goal=compose(self.task.start, exp(0.5 * self.task.fleet.radius[0] * NEAR_TWIST))
         )
-        one = Search(replace(near, world=World.of()), 0)
+        near = replace(near, world=World.of())
+        Trees(near, 0, direct=False)
+        one = Search(near, 0)
         for turn, _ in enumerate(one.rounds()):
             if turn > 8:
                 break
@@ -79,7 +86,7 @@ class Search:
         """
         if not self.task.first or not self.task.last:
             return
-        trees = Trees(self.task, int(self._rng.integers(1 << 60)))
+        trees = Trees(self.task, self._seed)
         self.work, self.nodes = trees.work, trees.size
         if trees.way is not None:
             self.best = trees.way

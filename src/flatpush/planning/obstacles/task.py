@@ -91,7 +91,7 @@ class Task:
         )
         return replace(self, fleet=back, start=self.goal, goal=self.start)
 
-    @property
+    @cached_property
     def first(self) -> list[int]:
         """The pushes that can begin: their fingers land at the start."""
         from .kernels import free, lands
@@ -99,10 +99,10 @@ class Task:
         T = self.arrays
         return [a for a in range(self.fleet.size) if free(T, a, self.start) and lands(T, a, self.start)]
 
-    @property
+    @cached_property
     def last(self) -> list[int]:
         """The pushes that can end: their fingers leave at the goal."""
-        return [int(a) for a in np.flatnonzero(self.arrays[9][3:])]
+        return [a for a, able in enumerate(self.arrays[9][3:].tolist()) if able]
 
 
 def _padded(points: Array, size: int) -> Array:

@@ -21,6 +21,26 @@ outer = nb.njit(cache=True, nogil=True, error_model="numpy")
 
 
 @outer
+def straight(T: Any, first: Any, start: Array, goal: Array, link: Array) -> int:
+    """The first push of which a word leads clear from the start to the goal, or -1.
+
+    Args:
+        first: whether each push may begin at the start.
+        link: becomes the word.
+    """
+    buffer, here = np.empty((WORDS, COLUMNS)), np.empty(3)
+    for a in range(len(T[6])):
+        if not first[a] or T[9][LAST + a] == 0.0:
+            continue
+        count = words(T[6][a], T[7][a], start, goal, buffer)
+        for i in range(count):
+            if keeps(T, a, start, buffer[i], here):
+                link[:] = buffer[i]
+                return a
+    return -1
+
+
+@outer
 def grow(
     T: Any, box: Array, first: Any, poses: Array, pushes: Any, parents: Any, rows: Array, sizes: Any, state: Any,
     joint: Any, link: Array, budget: int,
@@ -37,15 +57,6 @@ def grow(
     pose, here, near = np.empty(3), np.empty(3), np.empty(NEAR, np.int64)
     buffer, row = np.empty((WORDS, COLUMNS)), np.empty(COLUMNS)
     left = budget
-    if sizes[0] == 1 and sizes[1] == 1:
-        for a in range(k):
-            left -= 1
-            if not first[a] or T[9][LAST + a] == 0.0:
-                continue
-            if _joined(T, first, poses, pushes, 0, 0, poses[1, 0], a, buffer, row, here, WORDS):
-                joint[0], joint[1], joint[2] = 0, 0, a
-                link[:] = row
-                return left
     side = 0
     while left > 0 and sizes[0] < len(poses[0]) and sizes[1] < len(poses[1]):
         left -= 1

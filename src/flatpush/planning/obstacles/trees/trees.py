@@ -12,25 +12,35 @@ BUDGET = 2000  # words looked at
 class Trees:
     """Grown at once, deterministic for a seed.
 
+    Args:
+        budget: of words to look at.
+        direct: whether one word from the start to the goal is tried before anything grows.
+
     Attributes:
         way: the way that was found, or None; far from the cheapest.
         size: nodes of both trees; work: words that were looked at.
     """
 
-    def __init__(self, task: Task, seed: int, budget: int = BUDGET) -> None:
-        from .kernels import COLUMNS, grow
+    def __init__(self, task: Task, seed: int, budget: int = BUDGET, direct: bool = True) -> None:
+        from .kernels import COLUMNS, grow, straight
 
         k = task.fleet.size
         self._task = task
+        first = np.zeros(k, np.bool_)
+        first[task.first] = True
+        link = np.zeros(COLUMNS)
+        self.size, self.work = 2, k
+        push = int(straight(task.arrays, first, task.start, task.goal, link)) if direct else -1
+        if push >= 0:
+            self.way: Way | None = Way.of(task.fleet, task.start, self._pieces(push, link))
+            return
         self._poses, self._rows = np.empty((2, ROOM, 3)), np.zeros((2, ROOM, COLUMNS))
         self._pushes, self._parents = np.full((2, ROOM), -1), np.full((2, ROOM), -1)
         self._poses[:, 0] = task.start, task.goal
-        sizes, joint, link = np.ones(2, np.int64), np.full(3, -1), np.zeros(COLUMNS)
-        first = np.zeros(k, np.bool_)
-        first[task.first] = True
+        sizes, joint = np.ones(2, np.int64), np.full(3, -1)
         left = grow(
             task.arrays, task.extent, first, self._poses, self._pushes, self._parents, self._rows, sizes,
-            np.array([seed], dtype=np.uint64), joint, link, budget,
+            np.array([seed], dtype=np.uint64), joint, link, budget - k,
         )  # fmt: skip
         self.size, self.work = int(sizes.sum()), budget - max(int(left), 0)
         self.way = None if left < 0 else self._way(joint, link)
