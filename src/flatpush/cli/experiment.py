@@ -15,6 +15,10 @@ def command(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the recorded data, for those that read them.")
     ] = None,
+    runs: Annotated[
+        int | None, typer.Option(help="How many runs, for those with random ones; default: their own.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of random runs.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> int:
     """Run experiments NAMES and print their tables."""
@@ -24,11 +28,11 @@ def command(
         for name, about in EXPERIMENTS.items():
             typer.echo(f"{name:<12} {about}")
         return 0
-    runs = [experiment(name, data) for name in names]
+    ready = [experiment(name, data, runs, seed) for name in names]
     if figures is not None and not figures.is_dir():
         raise InputError("the folder for figures does not exist", source=str(figures))
     tables = {}
-    for name, run in zip(names, runs, strict=True):
+    for name, run in zip(names, ready, strict=True):
         with telling(f"running {name}"):
             tables[name] = run(figures)
         if not as_json:

@@ -16,26 +16,39 @@ EXPERIMENTS = {
     "cone": "two fingers with their composite cone against their virtual middle contact",
     "replay": "recorded runs of a robot through the simulator, calibrated and not (--data)",
     "crowded": "scenes full of obstacles, from a narrow passage to two hundred obstacles",
+    "feedback": "random tasks of one finger under feedback, on another table than believed (--runs, --seed)",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
+# Those that take a number of runs and a seed.
+RANDOM = {"feedback"}
 # Those that need the folder of recorded data.
 RECORDED = {"force-pushes", "replay"}
 
 
-def experiment(name: str, data: Path | None = None) -> Callable[[Path | None], str]:
+def experiment(
+    name: str, data: Path | None = None, runs: int | None = None, seed: int | None = None
+) -> Callable[[Path | None], str]:
     """The experiment of a name: a function that takes a folder for figures, or None, and returns its table.
 
     Args:
         data: folder of the recorded data; default: that which the environment's FLATPUSH_DATA names.
+        runs, seed: of an experiment with random runs; default: its own.
 
     Raises:
-        InputError: if there is no such experiment, or it needs recorded data and they are not there.
+        InputError: if there is no such experiment, it needs recorded data and they are not there, or runs or seed make
+            no sense.
     """
     if name not in EXPERIMENTS:
         raise InputError(
             "there is no such experiment", value=name, hint=f"There are: {', '.join(sorted(EXPERIMENTS))}."
         )
     run: Callable[..., str] = import_module(f"flatpush.experiments.{name.replace('-', '_')}").run
+    if runs is not None and runs < 1:
+        raise InputError("there is at least one run", key="runs", value=runs)
+    if seed is not None and seed < 0:
+        raise InputError("a seed is 0 or more", key="seed", value=seed)
+    if name in RANDOM:
+        return partial(run, runs=runs, seed=seed)
     if name not in RECORDED:
         return run
     folder = data if data is not None else os.environ.get("FLATPUSH_DATA")

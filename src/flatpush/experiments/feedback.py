@@ -7,9 +7,13 @@ off by up to 20 %. The camera takes 30 frames a second, 100 ms late, with 0.3 mm
 that end within 2 mm and 2°; runs in which no push could be steered even by who knew all that are counted apart.
 """
 
+import itertools
+import os
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
 
@@ -243,32 +247,74 @@ def _kind(end: Ended) -> str:
     return end.outcome.split(":")[0]
 
 
-def run(folder: Path | None = None, runs: int | None = None, seed: int | None = None) -> str:
-    """The tables; the disturbances take half as many runs as the tasks."""
-    count, first = runs or RUNS, SEED if seed is None else seed
-    tasks = [(k, task(k, first)) for k in range(count)]
-    usable = [(k, asked) for k, asked in tasks if asked.steerable]
-    lines = [
-        f"Random tasks of one finger, seed {first}: {count}, of which {count - len(usable)} have no push that can be"
-        " steered and are left out.",
-        f"{'controller':<24} {'within 2 mm and 2°':>21} {'median off the goal':>20} {'landings':>9} {'time':>10}",
-    ]
-    failures: list[str] = []
+@dataclass(frozen=True)
+class _Job:
+    """One run of a study, small enough to be sent to another process."""
+
+    number: int
+    seed: int
+    near: float
+    law: Law
+    learn: bool
+    disturbance: Disturbance
+
+    def ended(self) -> Ended | None:
+        """None where no push can be steered."""
+        asked = task(self.number, self.seed, self.near)
+        return attempt(asked, self.law, self.learn, self.disturbance)[0] if asked.steerable else None
+
+
+def _ended(job: _Job) -> Ended | None:
+    return job.ended()
+
+
+def run(
+    folder: Path | None = None, runs: int | None = None, seed: int | None = None, workers: int | None = None
+) -> str:
+    """The tables; each disturbance takes half as many runs as each controller.
+
+    Args:
+        runs: of each controller. seed: of the tasks. workers: processes; default: one for each core.
+    """
+    count, first = RUNS if runs is None else runs, SEED if seed is None else seed
     laws: tuple[Law, ...] = ("horizon", "path", "dfl")
     kinds: tuple[tuple[Disturbance, str], ...] = (
         ("displaced", "finger moved by 5 mm"),
         ("lost", "contact lost for 0.5 s"),
     )
-    for law in laws:
-        for learn in (True, False):
-            name = f"{law}{', learning' if learn else ''}"
-            ends = [(k, attempt(asked, law, learn)[0]) for k, asked in usable]
-            lines.append(line(name, [end for _, end in ends]))
-            failures += reasons(name, ends)
-    half = max(1, count // 2)
-    for kind, name in kinds:
-        disturbed = [(k, task(k, first + 1, near=0.1)) for k in range(half)]
-        ends = [(k, attempt(asked, "horizon", True, kind)[0]) for k, asked in disturbed if asked.steerable]
-        lines.append(line(name, [end for _, end in ends]))
-        failures += reasons(name, ends)
+    groups = {
+        f"{law}{', learning' if learn else ''}": [_Job(k, first, 0.0, law, learn, "") for k in range(count)]
+        for law in laws
+        for learn in (True, False)
+    }
+    groups |= {
+        name: [_Job(k, first + 1, 0.1, "horizon", True, kind) for k in range(max(1, count // 2))]
+        for kind, name in kinds
+    }
+    ends = dict(zip(groups, _all(list(groups.values()), workers), strict=True))
+    left_out = sum(end is None for end in ends["horizon"])
+    lines = [
+        f"Random tasks of one finger, seed {first}: {count}, of which {left_out} have no push that can be steered and"
+        " are left out.",
+        f"{'controller':<24} {'within 2 mm and 2°':>21} {'median off the goal':>20} {'landings':>9} {'time':>10}",
+    ]
+    failures: list[str] = []
+    for name, found in ends.items():
+        usable = [(k, end) for k, end in enumerate(found) if end is not None]
+        if usable:
+            lines.append(line(name, [end for _, end in usable]))
+            failures += reasons(name, usable)
     return "\n".join([*lines, "failures:" if failures else "no failures", *failures])
+
+
+def _all(groups: list[list[_Job]], workers: int | None) -> list[list[Ended | None]]:
+    """The ends of all jobs, group by group; in other processes if there is more than one worker."""
+    jobs = [job for group in groups for job in group]
+    count = min(workers or os.cpu_count() or 1, len(jobs))
+    if count <= 1:
+        found = [_ended(job) for job in jobs]
+    else:
+        with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+            found = list(pool.map(_ended, jobs, chunksize=max(1, len(jobs) // (8 * count))))
+    sizes = np.cumsum([0, *(len(group) for group in groups)])
+    return [found[a:b] for a, b in itertools.pairwise(sizes)]
