@@ -12,6 +12,7 @@ from .common import error_text, numbers, pose_text, print_json
 
 CONTROLLERS = ("path", "dfl", "horizon")
 TIMINGS = ("even", "plan")
+MOST_TOLD = 8
 
 
 def command(
@@ -160,8 +161,11 @@ def _tell(result: dict[str, Any], run: Any, figure: Path | None) -> None:
     typer.echo(f"off the goal by {error_text(result['distance'], result['turn'])}")
     typer.echo("controller: " + ", ".join(f"{m} {n}" for m, n in result["modes"].items()))
     typer.echo("contact: " + ", ".join(f"{m} {n}" for m, n in result["contacts"].items()))
-    shown = [note for note in run.notes if "friction cone allows" not in note[1]][:5]
-    for time, text in shown:
+    told = [note for note in run.notes if "friction cone allows" not in note[1]]
+    told = [note for note in told if note[1].startswith("landing")] or told
+    for time, text in told[:MOST_TOLD]:
         typer.echo(f"  {time:.2f} s: {text}")
+    if len(told) > MOST_TOLD:
+        typer.echo(f"  and {len(told) - MOST_TOLD} more")
     if figure is not None:
         typer.echo(f"wrote {figure}")

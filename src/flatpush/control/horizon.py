@@ -48,7 +48,7 @@ STRETCH, LEAST, DOUBT = 0.015, 0.002, 0.1
 LESS, FAILURES, LEEWAY = 0.85, 3, 0.15
 # Bounds on the friction that were learned are believed within this share of it.
 SPREAD = 0.3
-# What another landing counts as, where the scene's cost is not the flat path [m].
+# What another landing counts as at least: each begins with the errors of a look at the object [m].
 SWITCHING = 0.03
 
 
@@ -206,7 +206,7 @@ class HorizonController(AbstractController[HorizonState]):
     @property
     def _switching(self) -> float:
         planning = self.scene.planning
-        return planning.switching if planning.cost == "flat" else SWITCHING
+        return max(SWITCHING, planning.switching) if planning.cost == "flat" else SWITCHING
 
     def start(self, time: float = 0.0) -> HorizonState:
         if not np.isfinite(time):

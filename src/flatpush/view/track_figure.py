@@ -26,7 +26,7 @@ _COLOURS = {
     "retreat": palette.PUSHES[1],
     "saturated": palette.SIMULATED,
     "guarded": palette.PUSHES[1],
-    "waiting": "#bbbbbb",
+    "waiting": "#777777",
     "held": palette.START,
     "transit": palette.PUSHES[3],
     "done": palette.GOAL,
@@ -34,7 +34,7 @@ _COLOURS = {
 
 
 def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str = "") -> None:
-    """Draws a run as ".svg" or ".png".
+    """Draws a run as ".svg" or ".png"; the error of a controller that plans anew is its distance from the goal.
 
     Raises:
         InputError: if the ending is another, or the file cannot be written.
@@ -45,8 +45,12 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
     ending = check_ending(path, ENDINGS)
     cof = plan.scene.object.cof
     actual = transform(run.object, cof)
-    near = np.min([_distance(actual, transform(push.object, cof)) for push in plan.pushes], axis=0)
     modes = list(dict.fromkeys(run.modes))
+    replans = "look" in modes
+    if replans:
+        near = np.hypot(*(actual - transform(plan.scene.goal_pose, cof)).T)
+    else:
+        near = np.min([_distance(actual, transform(push.object, cof)) for push in plan.pushes], axis=0)
     with drawing_style():
         figure = new_figure(width=9.6, height=5.2)
         headline(figure, f"{plan.scene.object.name}: this plan under feedback", subtitle)
@@ -54,7 +58,14 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
         legend_below(
             figure,
             [
-                Line2D([], [], color=palette.START, linewidth=3, alpha=0.3, label="reference"),
+                Line2D(
+                    [],
+                    [],
+                    color=palette.START,
+                    linewidth=3,
+                    alpha=0.3,
+                    label="first plan" if replans else "reference",
+                ),
                 Line2D([], [], color=palette.SIMULATED, linewidth=1.2, label="actual, centre of friction"),
                 *(Patch(facecolor=look[m], label=m) for m in modes),
             ],
@@ -64,7 +75,10 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
         strip = figure.add_subplot(grid[1, 1], sharex=error)
         table_axes(wide)
         traces = trace_pushes(plan)
-        settle(figure, [(wide, view_box(plan, traces))])
+        box = view_box(plan, traces)
+        seen = MM * np.concatenate([actual, transform(run.object[-1], plan.scene.object.outline.vertices)])
+        low, high = np.minimum(box[:2], seen.min(axis=0)), np.maximum(box[2:], seen.max(axis=0))
+        settle(figure, [(wide, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))])
         draw_workspace(wide, plan.scene)
         draw_ends(wide, plan, traces)
         draw_object(wide, plan.scene, run.object[-1], palette.SIMULATED, linewidth=1.0, zorder=6)
@@ -73,7 +87,7 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
             wide.plot(*line.T, color=palette.START, linewidth=3, alpha=0.3, zorder=4)
         wide.plot(*(MM * actual).T, color=palette.SIMULATED, linewidth=1.2, zorder=7)
         error.plot(run.times, MM * near, color=palette.SIMULATED, linewidth=1.2)
-        error.set_ylabel("distance from the reference [mm]")
+        error.set_ylabel(f"distance from the {'goal' if replans else 'reference'} [mm]")
         error.set_ylim(bottom=0)
         error.tick_params(labelbottom=False)
         step = float(run.times[1] - run.times[0]) if len(run.times) > 1 else 1.0
