@@ -1,4 +1,4 @@
-"""Time of closed-loop runs and of one control step from Python.
+"""Time of closed-loop runs, and of one step of every controller from Python.
 
 `pytest benchmarks/test_control.py -n 0 -s` prints them; CPU time of one thread, so that other work on the machine does
 not count. FLATPUSH_RUNS sets how many runs there are (10,000 of 30 s at 60 Hz by default). Nothing is asserted.
@@ -6,17 +6,23 @@ not count. FLATPUSH_RUNS sets how many runs there are (10,000 of 30 s at 60 Hz b
 
 import os
 import time
+from collections import defaultdict
 
 import numpy as np
 import pytest
 
-from flatpush.control import Measurement
+from flatpush.control import Camera, Measurement, SimulatedSensor
+from flatpush.control.closed_loop import drive
 from flatpush.control.gains import Gains
+from flatpush.control.horizon import HorizonController
 from flatpush.control.linearisation import TrackingController
 from flatpush.control.path_following import PathController
 from flatpush.control.reference import PathReference
 from flatpush.control.rollouts import closed_loops
+from flatpush.experiments.feedback import PATIENCE, task
 from flatpush.experiments.fig4 import NOMINAL, matrix, push_model
+from flatpush.geometry import compose
+from flatpush.simulation.plant import Plant
 
 
 def controllers():
@@ -57,3 +63,39 @@ def test_control_step(law):
             state, _ = controller.step(state, frame, k / 60 + 0.1)
         spent.append((time.thread_time() - begun) / 500)
     print(f"\n{law}: {1e3 * min(spent):.3f} ms a step, 30 Hz camera with 100 ms latency")
+
+
+class Timed:
+    """A controller that notes how long each of its steps took, by what it was doing."""
+
+    def __init__(self, controller):
+        self.controller, self.rate = controller, controller.rate
+        self.start, self.spent = controller.start, defaultdict(list)
+
+    def step(self, state, measurement, time_):
+        begun = time.thread_time()
+        after, command = self.controller.step(state, measurement, time_)
+        spent = time.thread_time() - begun
+        landed = after.landings > state.landings
+        self.spent["choosing where to land, the pusher at rest" if landed else state.phase].append(spent)
+        return after, command
+
+
+def test_horizon_step():
+    spent = defaultdict(list)
+    for number in (-1, *range(12)):
+        asked = task(max(number, 0))
+        controller = Timed(HorizonController.of(asked.scene))
+        hand = compose(asked.scene.start_pose, [-0.1, 0.0, 0.0])
+        sensor = SimulatedSensor(Camera(), np.random.default_rng(0))
+        plant = Plant(asked.truth, [[0.0, 0.0]], asked.scene.pusher.tip_radius)
+        drive(controller, plant, asked.scene.start_pose, hand, sensor, PATIENCE)
+        if number >= 0:  # the run before compiles
+            for phase, times in controller.spent.items():
+                spent[phase] += times
+    print()
+    for phase, times in spent.items():
+        middle, high, most = 1e3 * np.quantile(times, [0.5, 0.99, 1.0])
+        print(
+            f"horizon, {phase}: {middle:.2f} ms a step, 99 % within {high:.2f}, {most:.2f} at most ({len(times)} steps)"
+        )

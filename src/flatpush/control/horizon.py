@@ -341,7 +341,8 @@ class HorizonController(AbstractController[HorizonState]):
         Y, S = sticking_displacement(point, mark.way, turn, math.hypot(sd, mark.sd))
         known = list(state.steering)
         known[state.push] = known[state.push].observed(point, Y, S)
-        return replace(state, steering=shared(known, self.scene.object.outline.size))
+        # The other pushes are told when the next of them is chosen.
+        return replace(state, steering=shared(known, self.scene.object.outline.size, state.push))
 
     # What is done ---------------------------------------------------------------------------------------------------
 
@@ -364,6 +365,8 @@ class HorizonController(AbstractController[HorizonState]):
             sd = self.sd / math.sqrt(len(state.frames))
             state = self.learned(state, state.mark, pose, sd, relative(pose, state.mark.hand)[:2])
             state = replace(state, mark=None)
+        if self.learn:
+            state = replace(state, steering=shared(state.steering, self.scene.object.outline.size))
         error = pose_error(pose, self.scene.goal)
         off = float(np.hypot(error[0], error[1])), abs(float(error[2]))
         inside = max(off[0] / self.tolerance[0], off[1] / self.tolerance[1])

@@ -66,11 +66,12 @@ def steering_of(scene: Scene, option: PushOption, edge: float) -> Steering:
     return Steering(car.cof, rho, sides, edges, drift, point, prior, prior.estimate())
 
 
-def shared(pushes: Sequence[Steering], size: float) -> tuple[Steering, ...]:
+def shared(pushes: Sequence[Steering], size: float, only: int | None = None) -> tuple[Steering, ...]:
     """The same pushes, each knowing what all have seen: they have one centre of friction, and each a ρ of its own.
 
     Args:
         size: of the object [m].
+        only: the push that is told; the others stay as they are. Default: all.
     """
     gains, pulls = [], []
     for push in pushes:
@@ -84,6 +85,9 @@ def shared(pushes: Sequence[Steering], size: float) -> tuple[Steering, ...]:
         pulls.append(more @ after.cof - less @ before.cof)
     known = []
     for k, push in enumerate(pushes):
+        if only is not None and k != only:
+            known.append(push)
+            continue
         belief = push.belief
         information, pull = belief.information.copy(), belief.information @ belief.before
         for j in range(len(pushes)):
