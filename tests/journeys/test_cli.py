@@ -26,8 +26,18 @@ def flatpush(*arguments, folder, **options) -> subprocess.CompletedProcess:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, **options)
 
 
-def interrupted(command, folder, seconds):
-    """How a command ends after Ctrl-C, so long after its start: status and what it said on stderr."""
+# What a shell starts in the background ignores Ctrl-C, and so would its children.
+HEEDFUL = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from flatpush.cli import main
+main()
+"""
+
+
+def interrupted(arguments, folder, seconds):
+    """How flatpush ends after Ctrl-C, so long after its start: status and what it said on stderr."""
+    command = [sys.executable, "-c", HEEDFUL, *map(str, arguments)]
     with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as running:
         time.sleep(seconds)
         running.send_signal(signal.SIGINT)
@@ -180,18 +190,7 @@ def test_interrupting_leaves_no_file(folder):
     (folder / "one.yaml").write_text(SCENE.replace("fingers: 2, spacing: 18, ", ""))
     flatpush("plan", "one.yaml", "-o", "plan.json", folder=folder)
     before = sorted(p.name for p in folder.iterdir())
-    command = [
-        sys.executable,
-        "-m",
-        "flatpush",
-        "simulate",
-        "plan.json",
-        "--runs",
-        "50000",
-        "-o",
-        "runs.json",
-    ]
-    ended, errors = interrupted(command, folder, 3)
+    ended, errors = interrupted(["simulate", "plan.json", "--runs", 50000, "-o", "runs.json"], folder, 3)
     assert ended == 130
     assert "Traceback" not in errors
     assert sorted(p.name for p in folder.iterdir()) == before
@@ -206,8 +205,7 @@ def test_interrupting_a_search_among_obstacles_keeps_the_best_plan(folder):
     )
     (folder / "maze.yaml").write_text(maze.replace("planning: {", "planning: {iterations: 1000000, "))
     flatpush("plan", "maze.yaml", "--time-limit", "0.01", folder=folder)  # compiles, if need be
-    command = [sys.executable, "-m", "flatpush", "plan", "maze.yaml", "-o", "plan.json"]
-    ended, errors = interrupted(command, folder, 15)
+    ended, errors = interrupted(["plan", "maze.yaml", "-o", "plan.json"], folder, 15)
     assert ended == 0, errors
     assert "best plan found so far" in errors
     assert flatpush("verify", "plan.json", folder=folder).returncode == 0

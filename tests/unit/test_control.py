@@ -59,6 +59,8 @@ def test_references_of_a_plan_are_exact(one_finger_plan, timed):
     # Every sample lies on the path, and the last at its end.
     ends = [path.at(0).position, path.at(path.duration).position]
     np.testing.assert_allclose(ends, z[[0, -1]], atol=1e-9)
+    if timed:  # and it stays there
+        np.testing.assert_allclose(path.at(path.duration + 0.1).position, z[-1], atol=1e-9)
     for t in np.linspace(0.01, 0.99, 23) * path.duration:
         h = 1e-5
         before, now, after = path.at(t - h), path.at(t), path.at(t + h)

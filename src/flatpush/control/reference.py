@@ -81,10 +81,11 @@ class PathReference(AbstractReference):
         """Arc length, flat speed and its rate at a time."""
         if not self.laws:
             return self.speed * time, self.speed, 0.0
-        for row, law in zip(self.table, self.laws, strict=True):
-            if time <= law.duration or row is self.table[-1]:
-                break
-            time -= law.duration
+        k = 0
+        while k + 1 < len(self.laws) and time > self.laws[k].duration:
+            time -= self.laws[k].duration
+            k += 1
+        row, law = self.table[k], self.laws[k]
         t, a, r = min(max(time, 0.0), law.duration), law.acceleration, law.ramp
         left = law.duration - t
         rate = a if t < r else -a if left < r else 0.0
