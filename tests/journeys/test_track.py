@@ -1,6 +1,7 @@
 """flatpush track, as a user runs it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from flatpush.cli.app import app
 from flatpush.control import Measurement, SimulatedSensor
 from flatpush.control.closed_loop import drive
 from flatpush.control.plan_controller import PlanController, goal_error
+from flatpush.geometry import compose
 from flatpush.simulation.plant import Plant
 
 
@@ -54,10 +56,13 @@ def test_what_makes_no_sense_is_refused(plan):
         ("--camera", "0", "camera is positive"),
         ("--friction", "-0.1", "0 or more"),
         ("--timing", "late", "even, plan"),
+        ("--centre", "100,0", "off the object"),
         ("--figure", "run.gif", "ends in"),
     ):
         with pytest.raises(fp.InputError, match=rule):
             call("track", path, option, value)
+    with pytest.raises(fp.InputError, match="frequency: gains are positive"):
+        call("track", path, "--controller", "dfl", "--frequency", "0")
     with pytest.raises(fp.InputError, match="at 10 Hz no k_d makes"):
         call("track", path, "--controller", "dfl", "--rate", "10", "--frequency", "30")
 
@@ -104,6 +109,29 @@ def test_feedback_brings_back_what_grows_without_it(plan):
     distance, turn = goal_error(plan[0], run.object[-1])
     assert distance < 0.002
     assert np.rad2deg(turn) < 2
+
+
+def test_a_finger_that_has_lost_the_object_stops(plan):
+    """Where the table is quite another and the finger slides off, it says so and does not push on into the air."""
+    thing = plan[0].scene.object
+    scene = plan[0].scene
+    controller = PlanController.of(plan[0], "path")
+    plant = Plant(thing, [[0.0, 0.0]], scene.pusher.tip_radius, friction=0.05, cof=[-0.02, 0.0])
+    hand = compose(plan[0].pushes[0].pusher[0], [-0.02, 0, 0])
+    sensor = SimulatedSensor(PERFECT, np.random.default_rng(0))
+    run = drive(controller, plant, scene.start_pose, hand, sensor, 120.0)
+    assert run.outcome == "the finger lost the object"
+    assert run.times[-1] < 30
+
+
+def test_frames_of_before_the_pusher_went_on_are_no_news(plan):
+    controller = PlanController.of(plan[0], "path")
+    frame = Measurement(0.0, np.asarray(plan[0].scene.start_pose), np.array([-0.1, 0.0, 0.0]))
+    state, _ = controller.step(controller.start(), frame, 0.1)
+    state = replace(state, newest=0.05)
+    after, _ = controller.step(state, replace(frame, time=0.02, object=np.array([0.1, 0.1, 1.0])), 0.11)
+    assert after.mode == "transit"
+    np.testing.assert_allclose(after.inner, state.inner)
 
 
 def test_a_bad_frame_on_the_way_to_the_object_stops_the_pusher(plan):

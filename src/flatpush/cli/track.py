@@ -85,6 +85,7 @@ def _run(
     learn: bool, seed: int,
 ) -> Any:  # fmt: skip
     import numpy as np
+    from shapely import MultiPoint, Point
 
     from ..control import Camera, SimulatedSensor
     from ..control.closed_loop import drive
@@ -102,14 +103,16 @@ def _run(
     else:
         sd = (max(eye.position, 1e-5), max(eye.angle, 1e-4))
         gains = Gains.of(frequency, damping)
-        law = PlanController.of(plan, name, rate, gains=gains, timing=timing, learn=learn, sd=sd)  # type: ignore[arg-type]
+        law = PlanController.of(
+            plan, name, rate, gains=gains, timing=timing, learn=learn, sd=sd, stale=0.5 + latency
+        )  # type: ignore[arg-type]
     scene, first = plan.scene, plan.pushes[0]
     if any(not np.allclose(p.fingers.shape, first.fingers.shape) for p in plan.pushes):
         raise InputError("every push of a tracked plan has as many fingers as the first")
-    plant = Plant(
-        scene.object, first.fingers, scene.pusher.tip_radius, friction=friction,
-        cof=scene.object.cof + np.array(shift) / 1000,
-    )  # fmt: skip
+    cof = scene.object.cof + np.array(shift) / 1000
+    if not MultiPoint(scene.object.outline.polyline()).convex_hull.covers(Point(cof)):
+        raise InputError("--centre takes the centre of friction off the object", value=shift)
+    plant = Plant(scene.object, first.fingers, scene.pusher.tip_radius, friction=friction, cof=cof)
     # The horizon controller looks, and lands again, as often as it takes.
     patience = 3 * plan.duration + (200 if name == "horizon" else 10)
     error = np.array([off[0] / 1000, off[1] / 1000, math.radians(off[2])])

@@ -47,6 +47,9 @@ class Gains:
     def of(cls, frequency: ArrayLike, damping: ArrayLike = 1.0) -> "Gains":
         """By natural frequency ω [rad/s] and damping ratio ζ: k_p = ω², k_d = 2ζω."""
         w, z = np.asarray(frequency, dtype=float), np.asarray(damping, dtype=float)
+        for name, value in (("frequency", w), ("damping", z)):
+            if not np.all(np.isfinite(value) & (value > 0)):
+                raise InputError("gains are positive and finite", key=name, value=value.tolist())
         return cls(w * w, 2 * z * w)
 
     def check(self, rate: float, hold: Hold = "ramp") -> None:
@@ -70,7 +73,7 @@ class Gains:
                 if low >= high:
                     rule = f"at {rate:g} Hz no k_d makes a k_p of {p:g}/s² stable"
                 raise InputError(
-                    rule, key=f"kd, {axis}", value=float(d), hint="Change the gains or the rate."
+                    rule, key=f"k_d along {axis}", value=float(d), hint="Change the gains or the rate."
                 )
 
     def decay(self, rate: float = np.inf, hold: Hold = "ramp") -> Array:

@@ -6,13 +6,13 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import InputError
-from ..geometry import compose, pose_error
+from ..geometry import compose, pose_error, relative
 from ..geometry.pose import Array
 from ..planning.options import push_option
 from ..problem import Plan
 from ..problem.mechanics import local_rho, named
 from .controller import ARRIVED, AbstractController, ControllerState
-from .frames import AHEAD
+from .frames import Seen, refusal
 from .gains import Gains
 from .learning import SteeringBelief
 from .learning_controller import LearningController
@@ -24,6 +24,8 @@ from .steering_model import SteeringModel
 
 # The prior of the centre of friction, by the object's size, and of ρ, by itself.
 SD_COF, SD_RHO = 0.03, 0.3
+# A hand so far before or behind its place at the contact has lost the object, by the object's size; beside it, so far.
+LOST_AHEAD, LOST_ASIDE = 0.25, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +134,20 @@ class PlanController(AbstractController[PlanState]):
         below, command = inner.step(state.inner, measurement, time)
         state = replace(state, inner=below, mode=below.mode, note=below.note)
         if not below.outcome:
+            if measurement is not None and below.mode != "held" and self._lost(state.push, measurement):
+                return replace(state, mode="done", outcome="the finger lost the object"), STOP
             return state, command
         if below.outcome != ARRIVED or state.push + 1 == len(self.inner):
             return replace(state, mode="done", outcome=below.outcome), STOP
         return replace(
             state, push=state.push + 1, inner=None, landing=True, down=False, hand=None, newest=time
         ), STOP
+
+    def _lost(self, push: int, frame: Measurement) -> bool:
+        """Whether the hand is nowhere near its place at the contact of a push; going on would push the air."""
+        size = self.plan.scene.object.outline.size
+        ahead, aside, _ = relative(self.inner[push].model.pusher, relative(frame.object, frame.pusher))
+        return abs(float(ahead)) > LOST_AHEAD * size or abs(float(aside)) > LOST_ASIDE * size
 
     def _land(self, state: PlanState, frame: Measurement | None, time: float) -> tuple[PlanState, Command]:
         """Lifted, to the approach distance from where the object was seen; then on the table, straight to the contact.
@@ -146,13 +156,14 @@ class PlanController(AbstractController[PlanState]):
         """
         dt, pusher = 1 / self.rate, self.plan.scene.pusher
         if frame is not None:
-            fresh = state.newest < frame.time <= time + AHEAD and time - frame.time <= self.stale
-            if not frame.finite or not fresh:
-                return replace(
-                    state, mode="held", note="a measurement that is not finite, or not of now"
-                ), STOP
-            hand = frame.pusher if state.hand is None else state.hand
-            state = replace(state, hand=np.asarray(hand, dtype=float), newest=frame.time, inner=frame.object)
+            wrong = refusal(frame, Seen(), time, "", self.stale)
+            if wrong:
+                return replace(state, mode="held", note=wrong), STOP
+            if frame.time > state.newest:
+                hand = frame.pusher if state.hand is None else state.hand
+                state = replace(
+                    state, hand=np.asarray(hand, dtype=float), newest=frame.time, inner=frame.object
+                )
         if state.hand is None or state.inner is None:
             return replace(state, mode="waiting", note="no measurement yet"), STOP
         before = 0.0 if state.down else pusher.approach

@@ -49,6 +49,8 @@ def experiment(
         raise InputError("a seed is 0 or more", key="seed", value=seed)
     if name in RANDOM:
         return partial(run, runs=runs, seed=seed)
+    if runs is not None or seed is not None:
+        raise InputError(f"the experiment {name!r} has no random runs", hint="Leave --runs and --seed out.")
     if name not in RECORDED:
         return run
     folder = data if data is not None else os.environ.get("FLATPUSH_DATA")
