@@ -80,8 +80,8 @@ def command(
 
 
 def _run(
-    plan: Any, name: str, rate: float, spread: list[float], camera: float, latency: float, dropped: float,
-    friction: float | None, shift: list[float], off: list[float], timing: str, frequency: float, damping: float,
+    plan: Any, name: Any, rate: float, spread: list[float], camera: float, latency: float, dropped: float,
+    friction: float | None, shift: list[float], off: list[float], timing: Any, frequency: float, damping: float,
     learn: bool, seed: int,
 ) -> Any:  # fmt: skip
     import numpy as np
@@ -105,7 +105,7 @@ def _run(
         gains = Gains.of(frequency, damping)
         law = PlanController.of(
             plan, name, rate, gains=gains, timing=timing, learn=learn, sd=sd, stale=0.5 + latency
-        )  # type: ignore[arg-type]
+        )
     scene, first = plan.scene, plan.pushes[0]
     if any(not np.allclose(p.fingers.shape, first.fingers.shape) for p in plan.pushes):
         raise InputError("every push of a tracked plan has as many fingers as the first")
