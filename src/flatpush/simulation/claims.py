@@ -64,6 +64,7 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
     pose = np.asarray(scene.start, dtype=float)
     worst: dict[str, float] = {}
     cars: dict[str, Any] = {}
+    judged: set[tuple[Any, ...]] = set()
     cost, growth, previous = 0.0, None, None
     for segment in pushes:
         placement = placement_of(scene, named(scene, segment.push))
@@ -77,6 +78,11 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> d
                 else _centres(scene, contact, surface)
             )
         for twist, at in _twists(scene, segment, contact):
+            # Margins depend on the direction of a twist, and a push has few of them.
+            what = (segment.push, *np.round(twist / max(float(np.linalg.norm(twist)), 1e-300), 12), *at.point)
+            if what in judged:
+                continue
+            judged.add(what)
             found = (_cone_margins if cone else _margins)(scene, surface, at, twist, placement)
             for key, value in found.items():
                 worst[key] = min(worst.get(key, np.inf), value)
