@@ -4,7 +4,7 @@
 speed. Towards the end of a reference, where it is at rest, the path law takes over.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..geometry import pose_error, wrap_angle
 from ..geometry.pose import Array
-from .controller import ARRIVED, AbstractController, ControllerState
-from .frames import Seen, after, predicted, refusal, with_command
+from .controller import ARRIVED
 from .gains import HOLDS, Gains, Hold
-from .laws.plain import linearised, point_velocity
-from .measurement import STOP, Command, Measurement
+from .laws.plain import linearised
+from .measurement import STOP, Command
+from .path_following import path_command
+from .push_controller import AbstractPushController, PushState, pusher_velocity
 from .reference import AbstractReference, PathReference, check_reference
 from .steering_model import SteeringModel
 
@@ -25,26 +26,24 @@ FLOOR, CAP = 0.1, 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class TrackingState(ControllerState):
+class TrackingState(PushState):
     """Of TrackingController and PostureController.
 
     Attributes:
         begun: when it started [s].
         speed: the compensator's state s [m/s]; nan before the first measurement.
-        seen: the newest frame, and commands since.
         scale: of w in the last tick; below 1 the friction cone bounded it.
         length: arc length reached, once the path law has taken over [m].
     """
 
     begun: float = 0.0
     speed: float = float("nan")
-    seen: Seen = field(default_factory=Seen)
     scale: float = 1.0
     length: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Linearised(AbstractController[TrackingState]):
+class _Linearised(AbstractPushController[TrackingState]):
     model: SteeringModel
     gains: Gains
     rate: float = 60.0
@@ -59,34 +58,7 @@ class _Linearised(AbstractController[TrackingState]):
 
     def _check(self) -> None:
         self.gains.check(self.rate, self.hold)
-        if not (np.isfinite(self.stale) and self.stale > 0):
-            raise InputError(
-                "the age at which a measurement is too old is positive", key="stale", value=self.stale
-            )
-
-    def _pose(
-        self, state: TrackingState, measurement: Measurement | None, time: float
-    ) -> tuple[TrackingState, Array | None]:
-        """The state with the measurement, and the pose of now; None where there is nothing good to go by."""
-        if measurement is not None:
-            wrong = refusal(measurement, state.seen, time, self.body, self.stale)
-            if wrong:
-                held = replace(
-                    state, mode="held", note=wrong, seen=with_command(state.seen, time, np.zeros(3))
-                )
-                return held, None
-            state = replace(state, seen=after(state.seen, measurement))
-        frame = state.seen.frame
-        if frame is None or time - frame.time > self.stale:
-            note = (
-                "no measurement yet"
-                if frame is None
-                else f"the last measurement is {time - frame.time:.3g} s old"
-            )
-            return replace(
-                state, mode="waiting", note=note, seen=with_command(state.seen, time, np.zeros(3))
-            ), None
-        return state, predicted(state.seen, time, self.model)
+        self.check_stale()
 
     def _tick(
         self,
@@ -118,17 +90,8 @@ class _Linearised(AbstractController[TrackingState]):
     def _command(
         self, state: TrackingState, pose: Array, time: float, speed: float, omega: float
     ) -> tuple[TrackingState, Command]:
-        m = self.model
-        ux, uy = point_velocity(
-            float(pose[2]) + m.heading, speed, omega, float(m.arm[0]), float(m.arm[1]), float(pose[2]),
-            1 / self.rate, HOLDS.index(self.hold),
-        )  # fmt: skip
-        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega / self.rate
-        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
-        velocity = np.array([ux, uy, omega if m.turns else 0.0])
-        if not np.all(np.isfinite(velocity)):
-            return self._stop(state, time, "the law gave no finite command")
-        return replace(state, seen=with_command(state.seen, time, velocity)), Command(velocity)
+        velocity = pusher_velocity(self.model, pose, speed, omega, 1 / self.rate, HOLDS.index(self.hold))
+        return self.moved(state, time, velocity)
 
     def _stop(self, state: TrackingState, time: float, outcome: str) -> tuple[TrackingState, Command]:
         return replace(state, mode="done", outcome=outcome), STOP
@@ -160,16 +123,7 @@ class TrackingController(_Linearised):
         # Dubins references turn as tightly as their margin allows, the model a little more.
         check_reference(self.reference, max(self.model.left, self.model.right))
 
-    def step(
-        self, state: TrackingState, measurement: Measurement | None, time: float
-    ) -> tuple[TrackingState, Command]:
-        if state.outcome:
-            return state, STOP
-        if not np.isfinite(time):
-            return replace(state, mode="held", note="the time is not finite"), STOP
-        state, pose = self._pose(state, measurement, time)
-        if pose is None:
-            return state, STOP
+    def act(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         t, T = time - state.begun, self.reference.duration
         if t >= T - 1e-9:
             return self._ending(state, pose, time)
@@ -179,8 +133,6 @@ class TrackingController(_Linearised):
 
     def _ending(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         """At rest the arc-length law takes over, until the end of the path is abeam."""
-        from .path_following import path_command
-
         path = self.reference
         if not (self.finish and isinstance(path, PathReference)):
             return self._stop(state, time, ARRIVED)
@@ -216,16 +168,7 @@ class PostureController(_Linearised):
         if not (np.isfinite(self.speed) and self.speed > 0):
             raise InputError("a flat speed is positive", key="speed", value=self.speed)
 
-    def step(
-        self, state: TrackingState, measurement: Measurement | None, time: float
-    ) -> tuple[TrackingState, Command]:
-        if state.outcome:
-            return state, STOP
-        if not np.isfinite(time):
-            return replace(state, mode="held", note="the time is not finite"), STOP
-        state, pose = self._pose(state, measurement, time)
-        if pose is None:
-            return state, STOP
+    def act(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         goal = np.asarray(self.goal, dtype=float)
         gx, gy, angle = self.model.flat_of(goal)
         x, y, heading = self.model.flat_of(pose)

@@ -1,16 +1,16 @@
 """Following the path of a push in arc length, without a singularity at rest: the default for Dubins references."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .controller import ARRIVED, AbstractController, ControllerState
-from .frames import Seen, after, predicted, refusal, with_command
+from .controller import ARRIVED
 from .gains import limits
-from .laws.plain import RAMP, along_path, nearest, point_velocity, wrapped
-from .measurement import STOP, Command, Measurement
+from .laws.plain import along_path, nearest, place, wrapped
+from .measurement import STOP, Command
+from .push_controller import AbstractPushController, PushState, pusher_velocity
 from .reference import PathReference
 from .steering_model import SteeringModel
 
@@ -19,11 +19,10 @@ POLE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class PathState(ControllerState):
-    """Of PathController: arc length reached [m], the newest frame and the commands since."""
+class PathState(PushState):
+    """Of PathController: with the arc length reached [m]."""
 
     length: float = 0.0
-    seen: Seen = field(default_factory=Seen)
 
 
 def path_gains(model: SteeringModel) -> tuple[float, float]:
@@ -45,8 +44,6 @@ def path_command(
     x, y, heading = model.flat_of(pose)
     reach = 0.25 / max(model.left, model.right)
     length = nearest(path.table, x, y, length, max(reach, 2 * speed * dt))
-    from .laws.plain import place
-
     px, py, angle, bend = place(path.table, length)
     left = (y - py) * np.cos(angle) - (x - px) * np.sin(angle)
     psi = wrapped(heading - angle)
@@ -61,7 +58,7 @@ def path_command(
 
 
 @dataclass(frozen=True, eq=False)
-class PathController(AbstractController[PathState]):
+class PathController(AbstractPushController[PathState]):
     """Follows a path at its flat speed or with its time law, wherever along it the object is.
 
     Args:
@@ -86,10 +83,7 @@ class PathController(AbstractController[PathState]):
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise InputError("a rate is positive", key="rate", value=self.rate)
-        if not (np.isfinite(self.stale) and self.stale > 0):
-            raise InputError(
-                "the age at which a measurement is too old is positive", key="stale", value=self.stale
-            )
+        self.check_stale()
         if not self.fastest > 0:
             raise InputError("a speed limit is positive", key="fastest", value=self.fastest)
         k1, k2 = self.gains
@@ -116,53 +110,14 @@ class PathController(AbstractController[PathState]):
             raise InputError("a time is finite", value=time)
         return PathState()
 
-    def step(
-        self, state: PathState, measurement: Measurement | None, time: float
-    ) -> tuple[PathState, Command]:
-        if state.outcome:
-            return state, STOP
-        if not np.isfinite(time):
-            return replace(state, mode="held", note="the time is not finite"), STOP
-        stop = np.zeros(3)
-        if measurement is not None:
-            wrong = refusal(measurement, state.seen, time, self.body, self.stale)
-            if wrong:
-                return replace(
-                    state, mode="held", note=wrong, seen=with_command(state.seen, time, stop)
-                ), STOP
-            state = replace(state, seen=after(state.seen, measurement))
-        frame = state.seen.frame
-        if frame is None or time - frame.time > self.stale:
-            note = (
-                "no measurement yet"
-                if frame is None
-                else f"the last measurement is {time - frame.time:.3g} s old"
-            )
-            return replace(state, mode="waiting", note=note, seen=with_command(state.seen, time, stop)), STOP
-        m, dt = self.model, 1 / self.rate
-        pose = predicted(state.seen, time, m)
+    def act(self, state: PathState, pose: Array, time: float) -> tuple[PathState, Command]:
+        dt = 1 / self.rate
         wanted = self.path.speed_from(state.length, dt)
-        found = path_command(m, self.path, pose, state.length, wanted, dt, self.gains)
+        found = path_command(self.model, self.path, pose, state.length, wanted, dt, self.gains)
         if found is None:
             return replace(state, mode="done", outcome=ARRIVED, length=self.path.length), STOP
         speed, omega, length, bounded = found
-        ux, uy = point_velocity(
-            float(pose[2]) + m.heading,
-            speed,
-            omega,
-            float(m.arm[0]),
-            float(m.arm[1]),
-            float(pose[2]),
-            dt,
-            RAMP,
-        )
-        across, middle = m.across(speed, omega), float(pose[2]) + m.heading + 0.5 * omega * dt
-        ux, uy = ux - across * np.sin(middle), uy + across * np.cos(middle)
-        slow = min(1.0, self.fastest / max(float(np.hypot(ux, uy)), 1e-300))
-        velocity = slow * np.array([ux, uy, omega if m.turns else 0.0])
-        if not np.all(np.isfinite(velocity)):
-            return replace(state, mode="done", outcome="the law gave no finite command"), STOP
+        velocity = pusher_velocity(self.model, pose, speed, omega, dt)
+        velocity *= min(1.0, self.fastest / max(float(np.hypot(velocity[0], velocity[1])), 1e-300))
         mode, note = ("saturated", "at the edge of the friction cone") if bounded else ("path", "")
-        return replace(
-            state, mode=mode, note=note, length=length, seen=with_command(state.seen, time, velocity)
-        ), Command(velocity)
+        return self.moved(replace(state, mode=mode, note=note, length=length), time, velocity)
