@@ -278,21 +278,21 @@ def test_while_pushing_the_centre_of_friction_of_a_perturbed_support_is_found():
 def test_slip_bounds_the_friction_from_above_and_sticking_from_below():
     controller = HorizonController.of(task(1).scene)
     state = controller.start()
-    from flatpush.control.horizon import Mark
+    from flatpush.control.horizon_state import Mark
 
     state = replace(state, push=0)
     tip = controller.planner.usable[0].placement.tips[0]
     mark = Mark(0.0, 0.001, tip, np.array([0.02, 0.0]), (0.2, 0.22))
     pose = np.zeros(3)
-    stuck = controller.learned(state, mark, pose, 0.001, tip).bounds
+    stuck = controller.watch.learned(state, mark, pose, 0.001, tip).bounds
     assert stuck.low == pytest.approx(0.11)
     assert stuck.high == np.inf
-    slid = controller.learned(state, mark, pose, 0.001, tip + np.array([0.0, 0.003])).bounds
+    slid = controller.watch.learned(state, mark, pose, 0.001, tip + np.array([0.0, 0.003])).bounds
     assert slid.low == 0
     assert slid.high == pytest.approx(0.32)
     # What is then believed narrows the cone of the cars.
     narrow = replace(state, bounds=replace(slid, high=0.25))
-    assert controller.car(narrow, 0, tip).radius > controller.car(state, 0, tip).radius
+    assert controller.watch.car(narrow, 0, tip).radius > controller.watch.car(state, 0, tip).radius
 
 
 # Bad input ------------------------------------------------------------------------------------------------------------

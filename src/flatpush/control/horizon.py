@@ -1,118 +1,46 @@
 """Receding horizon: at every tick the contact that is seen, its car, and the rest of the path planned anew."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import FlatpushError, InputError
-from ..geometry import Outline, compose, perpendicular, pose_error, relative, transform, wrap_angle
+from ..geometry import compose, pose_error, relative
 from ..geometry.pose import Array
 from ..planning import Planner
 from ..problem import Plan, Scene
-from .contact_car import ContactCar, contact_car
-from .controller import ARRIVED, AbstractController, ControllerState
-from .frames import Seen, after, predicted, refusal, with_command
+from .contact_car import ContactCar
+from .controller import ARRIVED, AbstractController
+from .frames import Seen, predicted, refusal, with_command
+from .horizon_state import HorizonState, Mark
 from .landings import next_push
 from .laws.plain import RAMP, point_velocity, wrapped
-from .learning import FrictionBounds, sticking_displacement
+from .learning import FrictionBounds
 from .measurement import STOP, Command, Measurement
 from .rest_of_path import rest_of_path
 from .steering import Steering, shared, steering_of
+from .watching import EDGE, LOST, Watch, mean_pose, touched
 
-Phase = Literal["look", "transit", "push", "resume", "retreat"]
-
-# Plans leave this share of the friction cone, feedback may use all but the second; both cover friction that is a
-# fifth less than believed.
-RESERVE, EDGE = 0.4, 0.2
-# Of a frame, so much counts against what was expected: position, angle, and the place of the finger on the object.
-POSITION_GAIN, ANGLE_GAIN, PLACE_GAIN = 0.25, 0.2, 0.15
+# Plans leave this share of the friction cone, feedback may use more of it (watching.EDGE); both cover friction that is
+# a fifth less than believed.
+RESERVE = 0.4
 # Frames averaged over an object at rest.
 FRAMES = 10
 # The share of the tolerance that an average of these frames has to keep.
 INSIDE = 0.85
-# A finger farther from the edge has lost it; back within NEAR it has it again [m].
-LOST, NEAR = 0.0007, 0.0001
-# A contact that has moved so far along the edge has slipped [m]; where its car then turns so much less tightly than
-# where it landed, another landing is better.
-SLIPPED, WORSE = 0.0008, 2.5
+# A finger that had lost the edge has it again when it is as near as this [m].
+NEAR = 0.0001
+# Where the car of a contact that slipped turns so much less tightly than where it landed, another landing is better.
+WORSE = 2.5
 # Contacts are found again so often in one push before another landing is tried.
 RESUMES = 5
-# Stretches that are learned from [m], and the shortest [m]; what is not known of the ratio of the forces.
-STRETCH, LEAST, DOUBT = 0.015, 0.002, 0.1
-# After every failure of a push it is taken to have so much of the friction; pushes that failed so often are left out,
-# and those whose straight force lies nearer to the edge of the friction cone than this share of its half angle.
-LESS, FAILURES, LEEWAY = 0.85, 3, 0.15
-# Bounds on the friction that were learned are believed within this share of it.
-SPREAD = 0.3
+# Pushes that failed so often are left out, and those whose straight force lies nearer to the edge of the friction cone
+# than this share of its half angle.
+FAILURES, LEEWAY = 3, 0.15
 # What another landing counts as at least: each begins with the errors of a look at the object [m].
 SWITCHING = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class Mark:
-    """Where a stretch began that is to be learned from, and what has happened since.
-
-    Attributes:
-        angle: of the object then [rad], with its standard deviation sd. tip: of the finger in O then.
-        way: ∫ of the contact point's velocity in O since, shape (2,) [m], the drift of the flat point taken off.
-        ratios: |tangential| / normal force that the turns since asked for.
-        hand: X_WE at the end of the push.
-    """
-
-    angle: float
-    sd: float
-    tip: Array
-    way: Array = field(default_factory=lambda: np.zeros(2))
-    ratios: tuple[float, ...] = ()
-    hand: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class HorizonState(ControllerState):
-    """Of HorizonController.
-
-    Attributes:
-        phase: "look" at the object at rest, "transit" to a contact, "push", "resume" (the finger has lost the edge and
-            comes back to it), "retreat".
-        since: frames exposed before this do not count while looking [s]; frames: poses seen since.
-        newest: the newest frame as it came. seen: what it means, with the pose as it is believed, or what was known at
-            the last landing, and the commands since. expected: X_WO at the last tick, if no frame came since.
-        way: poses and heights still to go to (x, y, θ, height), the next first. height: of the pusher now [m].
-        push: which option; target: X_WO where it shall end. tip: centre of the finger in O, smoothed,
-            and its gap to the edge [m].
-        car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
-            allowed: it ends after this at the latest [m].
-        landings, resumes: how many there were, of the latter in this push.
-        failures: how often the finger slipped, or lost the edge too often, at every option.
-        steering: of every option. bounds: of the friction between finger and object. mark: see Mark.
-    """
-
-    phase: Phase = "look"
-    since: float = -np.inf
-    frames: tuple[Array, ...] = ()
-    newest: Measurement | None = None
-    expected: Array | None = None
-    seen: Seen = field(default_factory=Seen)
-    way: tuple[Array, ...] = ()
-    height: float = 0.0
-    push: int = -1
-    target: Array | None = None
-    tip: Array | None = None
-    gap: float = 0.0
-    car: ContactCar | None = None
-    landed: float = np.inf
-    rest: float = np.inf
-    allowed: float = np.inf
-    landings: int = 0
-    resumes: int = 0
-    failures: tuple[int, ...] = ()
-    steering: tuple[Steering, ...] = ()
-    bounds: FrictionBounds = field(default_factory=FrictionBounds)
-    mark: Mark | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +131,11 @@ class HorizonController(AbstractController[HorizonState]):
         prior = tuple(steering_of(planner.scene, option, EDGE) for option in planner.usable)
         return cls(planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits)
 
+    @cached_property
+    def watch(self) -> Watch:
+        """What makes sense of the frames."""
+        return Watch(self.scene, self.sd)
+
     @property
     def _switching(self) -> float:
         planning = self.scene.planning
@@ -227,7 +160,7 @@ class HorizonController(AbstractController[HorizonState]):
             state = replace(state, newest=measurement)
             # At a landing all is known as of then; what was exposed before and comes late is no news.
             if state.seen.frame is None or measurement.time > state.seen.frame.time:
-                state = self._watched(replace(state, expected=None), measurement)
+                state = self.watch.seen(replace(state, expected=None), measurement)
         frame = state.newest
         if frame is None:
             return self._stopped(state, time, "waiting", "no measurement yet")
@@ -248,104 +181,6 @@ class HorizonController(AbstractController[HorizonState]):
         seen = with_command(state.seen, time, velocity)
         return replace(state, seen=seen), Command(velocity, state.height)
 
-    # What is seen ---------------------------------------------------------------------------------------------------
-
-    def _watched(self, state: HorizonState, frame: Measurement) -> HorizonState:
-        """The state after a frame that is good."""
-        before = state.seen.frame
-        if state.phase != "push" or state.car is None or before is None or state.tip is None:
-            if state.phase == "look" and frame.time >= state.since - 1e-9:
-                state = replace(state, frames=(*state.frames, np.asarray(frame.object, dtype=float)))
-            if state.phase == "resume":
-                # While the finger is off the object this rests: the frames are averaged.
-                state = replace(state, frames=(*state.frames, np.asarray(frame.object, dtype=float)))
-            return replace(state, seen=after(state.seen, frame))
-        model, dt = state.car.model, frame.time - before.time
-        u = (np.asarray(frame.pusher, dtype=float) - before.pusher) / dt
-        x, y, turn = (float(v) for v in before.object)
-        n = model.pusher[2] + turn
-        if u[0] * math.cos(n) + u[1] * math.sin(n) > 0:
-            x, y, turn = model.moved(x, y, turn, float(u[0]), float(u[1]), dt)
-        innovation = pose_error(frame.object, [x, y, turn])
-        believed = np.array([x, y, turn]) + innovation * (POSITION_GAIN, POSITION_GAIN, ANGLE_GAIN)
-        believed = self._touching(state.car, believed, np.asarray(frame.pusher, dtype=float))
-        tip = state.tip + PLACE_GAIN * (relative(frame.object, frame.pusher)[:2] - state.tip)
-        state = replace(state, tip=tip, seen=after(state.seen, replace(frame, object=believed)))
-        if state.mark is not None:
-            mark = self._along(state, state.mark, before, np.asarray(frame.pusher, dtype=float), believed[2])
-            state = replace(state, mark=mark)
-            if float(np.hypot(*mark.way)) >= STRETCH:
-                state = self.learned(state, mark, np.asarray(frame.object, dtype=float), self.sd, tip)
-                state = replace(state, mark=Mark(float(frame.object[2]), self.sd, tip))
-        gap = touched(self.scene.object.outline, tip)[2] - self.scene.pusher.tip_radius
-        return replace(state, car=self.car(state, state.push, tip), gap=gap)
-
-    def _touching(self, car: ContactCar, pose: Array, hand: Array) -> Array:
-        """A pose moved along the normal so that the finger touches the edge, if it is near enough to do so."""
-        c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
-        n, p = car.normal, car.contact
-        nx, ny = c * n[0] - s * n[1], s * n[0] + c * n[1]
-        px, py = pose[0] + c * p[0] - s * p[1], pose[1] + s * p[0] + c * p[1]
-        gap = (px - hand[0]) * nx + (py - hand[1]) * ny - self.scene.pusher.tip_radius
-        if abs(gap) > LOST:
-            return pose
-        return np.array([pose[0] - gap * nx, pose[1] - gap * ny, pose[2]])
-
-    def car(self, state: HorizonState, push: int, tip: ArrayLike) -> ContactCar | None:
-        """Of a finger of a push whose centre is at a place in O, as far as is now known."""
-        point, normal, _ = touched(self.scene.object.outline, tip)
-        known, believed = state.steering[push], self.scene.object.friction
-        low, high = (1 - SPREAD) * believed, (1 + SPREAD) * believed
-        friction = min(max(state.bounds.clip(believed), low), high) * LESS ** state.failures[push]
-        return contact_car(
-            point,
-            normal,
-            known.cof,
-            known.rho,
-            friction,
-            self.scene.pusher.tip_radius,
-            reserve=self.scene.planning.friction_margin,
-            edge=EDGE,
-            sides=known.sides,
-            edges=known.edges,
-            drift=known.drift,
-            turns=self.scene.pusher.turns,
-        )
-
-    def _along(
-        self, state: HorizonState, mark: Mark, before: Measurement, pusher: Array, turned: float
-    ) -> Mark:
-        """The mark after the pusher has gone from a frame to X_WE, where the object is turned so far."""
-        assert state.car is not None
-        reach = [self.scene.pusher.tip_radius, 0.0]
-        step = transform(pusher, reach) - transform(before.pusher, reach)
-        middle = 0.5 * (float(before.object[2]) + turned)
-        c, s = math.cos(middle), math.sin(middle)
-        moved = np.array([c * step[0] + s * step[1], c * step[1] - s * step[0]])
-        model = state.car.model
-        speed, omega = model.motion(float(moved[0]), float(moved[1]))
-        moved -= model.across(speed, omega) * perpendicular(model.direction)
-        return replace(mark, way=mark.way + moved)
-
-    def learned(self, state: HorizonState, mark: Mark, pose: Array, sd: float, tip: Array) -> HorizonState:
-        """What a stretch of sticking that ends at a pose tells of the axle; sticking or slipping, of the friction."""
-        if float(np.hypot(*mark.way)) < LEAST:
-            return state
-        ratios = mark.ratios
-        if float(np.hypot(*(tip - mark.tip))) > (SLIPPED if mark.hand is None else 0.5 * SLIPPED):
-            return replace(state, bounds=state.bounds.slipped(max(ratios), DOUBT)) if ratios else state
-        if ratios:
-            state = replace(state, bounds=state.bounds.stuck(float(np.mean(ratios)), DOUBT))
-        point, _, _ = touched(self.scene.object.outline, tip)
-        turn = float(wrap_angle(pose[2] - mark.angle))
-        Y, S = sticking_displacement(point, mark.way, turn, math.hypot(sd, mark.sd))
-        known = list(state.steering)
-        known[state.push] = known[state.push].observed(point, Y, S)
-        # The other pushes are told when the next of them is chosen.
-        return replace(state, steering=shared(known, self.scene.object.outline.size, state.push))
-
-    # What is done ---------------------------------------------------------------------------------------------------
-
     def _stopped(
         self, state: HorizonState, time: float, mode: str, note: str
     ) -> tuple[HorizonState, Command]:
@@ -363,7 +198,7 @@ class HorizonController(AbstractController[HorizonState]):
         pose[2] = wrapped(float(pose[2]))
         if state.mark is not None and state.mark.hand is not None:
             sd = self.sd / math.sqrt(len(state.frames))
-            state = self.learned(state, state.mark, pose, sd, relative(pose, state.mark.hand)[:2])
+            state = self.watch.learned(state, state.mark, pose, sd, relative(pose, state.mark.hand)[:2])
             state = replace(state, mark=None)
         if self.learn:
             state = replace(state, steering=shared(state.steering, self.scene.object.outline.size))
@@ -421,7 +256,7 @@ class HorizonController(AbstractController[HorizonState]):
         cars: list[ContactCar | None] = []
         for k, option in enumerate(self.planner.usable):
             assert option.placement is not None
-            car = self.car(state, k, option.placement.tips[0]) if state.failures[k] < FAILURES else None
+            car = self.watch.car(state, k, option.placement.tips[0]) if state.failures[k] < FAILURES else None
             cars.append(car if car is not None and car.leeway >= LEEWAY else None)
         return cars
 
@@ -531,7 +366,7 @@ class HorizonController(AbstractController[HorizonState]):
         if gap <= NEAR:
             seen = Seen(Measurement(time, pose, hand))
             state = replace(state, phase="push", tip=tip, gap=0.0, seen=seen, frames=(), expected=None)
-            return self._push(replace(state, car=self.car(state, state.push, tip)), time)
+            return self._push(replace(state, car=self.watch.car(state, state.push, tip)), time)
         speed = min(self.scene.pusher.speed, gap * self.rate)
         c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
         along = np.array([c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], 0.0])
@@ -549,7 +384,7 @@ class HorizonController(AbstractController[HorizonState]):
         mark = state.mark
         if mark is not None and state.car is not None:
             turned = float(predicted(state.seen, time, state.car.model)[2])
-            mark = replace(self._along(state, mark, frame, hand, turned), hand=hand)
+            mark = replace(self.watch.along(state, mark, frame, hand, turned), hand=hand)
         return self._go(replace(state, phase="retreat", way=(stop,), note=why, mark=mark), time)
 
     def hand(self, state: HorizonState, time: float) -> Array:
@@ -564,19 +399,3 @@ class HorizonController(AbstractController[HorizonState]):
             if dt > 0:
                 hand += dt * velocity
         return hand
-
-
-def touched(outline: Outline, tip: ArrayLike) -> tuple[Array, Array, float]:
-    """The point of an outline nearest to a fingertip's centre in O, the inward normal there, and the distance."""
-    p = np.asarray(tip, dtype=float)
-    found = outline.nearest(p)
-    normal = found.normal
-    if found.corner and found.distance > 1e-9:
-        normal = (found.point - p) / found.distance
-    return found.point, normal, found.distance
-
-
-def mean_pose(poses: Sequence[Array]) -> Array:
-    """The mean of poses that lie near to each other."""
-    first = np.asarray(poses[0], dtype=float)
-    return np.asarray(first + np.mean([pose_error(p, first) for p in poses], axis=0))

@@ -1,0 +1,79 @@
+"""What the horizon controller remembers from tick to tick."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from ..geometry.pose import Array
+from .contact_car import ContactCar
+from .controller import ControllerState
+from .frames import Seen
+from .learning import FrictionBounds
+from .measurement import Measurement
+from .steering import Steering
+
+Phase = Literal["look", "transit", "push", "resume", "retreat"]
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """Where a stretch began that is to be learned from, and what has happened since.
+
+    Attributes:
+        angle: of the object then [rad], with its standard deviation sd. tip: of the finger in O then.
+        way: ∫ of the contact point's velocity in O since, shape (2,) [m], the drift of the flat point taken off.
+        ratios: |tangential| / normal force that the turns since asked for.
+        hand: X_WE at the end of the push.
+    """
+
+    angle: float
+    sd: float
+    tip: Array
+    way: Array = field(default_factory=lambda: np.zeros(2))
+    ratios: tuple[float, ...] = ()
+    hand: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class HorizonState(ControllerState):
+    """Of HorizonController.
+
+    Attributes:
+        phase: "look" at the object at rest, "transit" to a contact, "push", "resume" (the finger has lost the edge and
+            comes back to it), "retreat".
+        since: frames exposed before this do not count while looking [s]; frames: poses seen since.
+        newest: the newest frame as it came. seen: what it means, with the pose as it is believed, or what was known at
+            the last landing, and the commands since. expected: X_WO at the last tick, if no frame came since.
+        way: poses and heights still to go to (x, y, θ, height), the next first. height: of the pusher now [m].
+        push: which option; target: X_WO where it shall end. tip: centre of the finger in O, smoothed,
+            and its gap to the edge [m].
+        car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
+            allowed: it ends after this at the latest [m].
+        landings, resumes: how many there were, of the latter in this push.
+        failures: how often the finger slipped, or lost the edge too often, at every option.
+        steering: of every option. bounds: of the friction between finger and object. mark: see Mark.
+    """
+
+    phase: Phase = "look"
+    since: float = -np.inf
+    frames: tuple[Array, ...] = ()
+    newest: Measurement | None = None
+    expected: Array | None = None
+    seen: Seen = field(default_factory=Seen)
+    way: tuple[Array, ...] = ()
+    height: float = 0.0
+    push: int = -1
+    target: Array | None = None
+    tip: Array | None = None
+    gap: float = 0.0
+    car: ContactCar | None = None
+    landed: float = np.inf
+    rest: float = np.inf
+    allowed: float = np.inf
+    landings: int = 0
+    resumes: int = 0
+    failures: tuple[int, ...] = ()
+    steering: tuple[Steering, ...] = ()
+    bounds: FrictionBounds = field(default_factory=FrictionBounds)
+    mark: Mark | None = None
