@@ -1,6 +1,6 @@
 """Feedback on a sticking push: references, linearisation, path law, and what they do with bad input."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,6 +9,8 @@ import flatpush as fp
 from flatpush.control import Camera, Measurement, SimulatedSensor
 from flatpush.control.closed_loop import drive
 from flatpush.control.gains import HOLDS, Gains, limits
+from flatpush.control.learning import SteeringBelief
+from flatpush.control.learning_controller import LearningController
 from flatpush.control.linearisation import PostureController, TrackingController
 from flatpush.control.path_following import PathController
 from flatpush.control.reference import AbstractReference, FlatState, PathReference, check_reference
@@ -248,6 +250,32 @@ def test_a_late_camera_is_made_up_for_by_prediction(law):
         error = pose_error(found.object[-1], [0, 0.15, 0])
         assert np.hypot(error[0], error[1]) < 2e-4
         assert abs(error[2]) < 0.02
+
+
+def test_nonsense_that_was_learned_is_not_believed():
+    """Centres of rotation on the wrong side of the centre of friction: no table does that, a finger that slips may."""
+    _, model = square_push()
+    contact = model.contact
+    prior = SteeringBelief.prior([0.0, 0.0], 4e-4, 0.002, 1e-4)
+    wild = prior
+    for y in (-0.03, 0.03):
+        turn = 0.2 * np.sign(y)
+        q = 0.5 * contact + [y * contact[1], -y * contact[0]] / np.hypot(*contact)
+        wild = wild.observed(contact, [turn * q[1], -turn * q[0], turn], np.diag([1e-14] * 3))
+    assert not wild.estimate().believable(prior.estimate())
+    assert wild.better_than_prior(contact)
+    path = PathReference.straight(
+        model.flat_of([0.0, 0.0, 0.0])[:2], model.flat_of([0.0, 0.0, 0.0])[2], 0.1, 0.01
+    )
+    controller = LearningController(PathController(model, path), prior)
+    state = replace(controller.start(), belief=wild)
+    for k, way in enumerate((0.0, 0.005)):
+        pose = np.array([*(way * model.direction), 0.0])
+        frame = Measurement(0.1 * k, pose, compose(pose, model.pusher))
+        state, command = controller.step(state, frame, 0.1 * k)
+    assert state.belief.count > wild.count
+    assert state.model is model
+    assert np.all(np.isfinite(command.velocity))
 
 
 def test_the_posture_law_arrives_along_the_goal():

@@ -244,12 +244,12 @@ def test_one_push_teaches_the_others_the_centre_of_friction():
             Y = np.array([*(0.01 * h + side * np.array([-h[1], h[0]])), turn])
             assert abs(b @ Y) < 1e-12
             known[k] = known[k].observed(p, Y, np.diag([1e-10, 1e-10, 1e-6]))
-    told = shared(known, scene.object.outline.size)
+    told = shared(known)
     for push in told:
         np.testing.assert_allclose(push.cof, true, atol=2e-4)
     # Nonsense is not believed.
     wild = [known[0].observed(known[0].point, [0.01, 0.02, 0.0], np.diag([1e-10] * 3)), *known[1:]]
-    np.testing.assert_allclose(shared(wild, scene.object.outline.size)[0].cof, known[0].prior.cof)
+    np.testing.assert_allclose(shared(wild)[0].cof, known[0].prior.cof)
 
 
 def test_while_pushing_the_centre_of_friction_of_a_perturbed_support_is_found():

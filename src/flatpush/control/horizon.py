@@ -201,7 +201,7 @@ class HorizonController(AbstractController[HorizonState]):
             state = self.watch.learned(state, state.mark, pose, sd, relative(pose, state.mark.hand)[:2])
             state = replace(state, mark=None)
         if self.learn:
-            state = replace(state, steering=shared(state.steering, self.scene.object.outline.size))
+            state = replace(state, steering=shared(state.steering))
         error = pose_error(pose, self.scene.goal)
         off = float(np.hypot(error[0], error[1])), abs(float(error[2]))
         inside = max(off[0] / self.tolerance[0], off[1] / self.tolerance[1])

@@ -36,6 +36,8 @@ FLAT = 1e-12
 STANDS_OUT = 4.0
 # The estimate counts as better than the prior when it knows the heading of the axle this much better.
 BETTER = 0.8
+# An estimate farther from the prior than this is not believed, by the prior's standard deviations.
+FAR = 3.0
 
 
 class Axle(NamedTuple):
@@ -82,6 +84,12 @@ class SteeringEstimate:
         """Standard deviation of ρ [m²]."""
         g = np.array([-2 * self.cof[0], -2 * self.cof[1], 1.0])
         return float(np.sqrt(float(g @ self.covariance @ g)))
+
+    def believable(self, prior: "SteeringEstimate") -> bool:
+        """Whether it is not far outside a prior; a finger that slipped unseen gives nonsense."""
+        sd = np.sqrt(np.diag(prior.covariance)[:2])
+        near = bool(np.hypot(*((self.cof - prior.cof) / sd)) <= FAR)
+        return near and abs(self.rho - prior.rho) <= FAR * prior.rho_sd and self.rho > 0
 
     def axle(self, point: ArrayLike) -> Axle:
         """The axle of a contact, with what is known of it."""

@@ -30,7 +30,8 @@ class LearningState(ControllerState):
 class LearningController(AbstractController[LearningState]):
     """Runs another controller with the model that the motion seen so far makes likely.
 
-    The estimate is used once it knows the heading of the axle clearly better than the prior did.
+    The estimate is used once it knows the heading of the axle clearly better than the prior did, unless it lies far
+    outside that.
 
     Args:
         inner: a TrackingController or PathController.
@@ -83,6 +84,7 @@ class LearningController(AbstractController[LearningState]):
         p, a = 2 * self.sd[0] ** 2, 2 * self.sd[1] ** 2
         belief = state.belief.observed(self.inner.model.contact, log(moved), np.diag([p, p, a]))
         model = self.inner.model
-        if belief.better_than_prior(model.contact):
-            model = model.about(belief.estimate())
+        estimate = belief.estimate()
+        if belief.better_than_prior(model.contact) and estimate.believable(self.prior.estimate()):
+            model = model.about(estimate)
         return replace(state, belief=belief, since=frame, model=model)

@@ -17,8 +17,6 @@ from .learning import SteeringBelief, SteeringEstimate
 SD_COF, SD_RHO = 0.015, 0.15
 # What was learned is used once it knows the heading of the axle so much better than the prior.
 BETTER = 0.9
-# What was learned is not believed farther from the prior than this, by its standard deviations.
-FAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +64,10 @@ def steering_of(scene: Scene, option: PushOption, edge: float) -> Steering:
     return Steering(car.cof, rho, sides, edges, drift, point, prior, prior.estimate())
 
 
-def shared(pushes: Sequence[Steering], size: float, only: int | None = None) -> tuple[Steering, ...]:
+def shared(pushes: Sequence[Steering], only: int | None = None) -> tuple[Steering, ...]:
     """The same pushes, each knowing what all have seen: they have one centre of friction, and each a ρ of its own.
 
     Args:
-        size: of the object [m].
         only: the push that is told; the others stay as they are. Default: all.
     """
     gains, pulls = [], []
@@ -101,12 +98,9 @@ def shared(pushes: Sequence[Steering], size: float, only: int | None = None) -> 
         )
         estimate, prior = told.estimate(), push.prior
         better = estimate.axle(push.point).heading_sd < BETTER * prior.axle(push.point).heading_sd
-        # A finger that slipped unseen gives nonsense: what lies far outside the prior is not believed.
-        far = float(np.hypot(*(estimate.cof - prior.cof))) > FAR * SD_COF * size
-        far |= abs(estimate.rho - prior.rho) > FAR * SD_RHO * prior.rho
         known.append(
             replace(push, cof=estimate.cof, rho=estimate.rho)
-            if better and not far
+            if better and estimate.believable(prior)
             else replace(push, cof=prior.cof, rho=prior.rho)
         )
     return tuple(known)

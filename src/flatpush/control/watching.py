@@ -137,7 +137,7 @@ class Watch:
         known = list(state.steering)
         known[state.push] = known[state.push].observed(point, Y, S)
         # The other pushes are told when the next of them is chosen.
-        return replace(state, steering=shared(known, self.scene.object.outline.size, state.push))
+        return replace(state, steering=shared(known, state.push))
 
 
 def touched(outline: Outline, tip: ArrayLike) -> tuple[Array, Array, float]:

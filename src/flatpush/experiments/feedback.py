@@ -192,7 +192,7 @@ def controlled(law: Law, learn: bool, scene: Scene, rate: float) -> HorizonContr
 def attempt(
     asked: Task, law: Law = "horizon", learn: bool = True, disturbance: Disturbance = "", rate: float = 60.0
 ) -> tuple[Ended, ClosedLoopRun | None]:
-    """Runs one task; without a run if the controller refuses it."""
+    """Runs one task; without a run if the controller refuses it or breaks off with an error."""
     scene = asked.scene
     try:
         controller = controlled(law, learn, scene, rate)
@@ -210,7 +210,10 @@ def attempt(
         landings = max(landings, getattr(state, "landings", 1))
 
     sensor = SimulatedSensor(Camera(), rng)
-    run = drive(controller, plant, scene.start_pose, hand, sensor, PATIENCE, told=told)
+    try:
+        run = drive(controller, plant, scene.start_pose, hand, sensor, PATIENCE, told=told)
+    except FlatpushError as error:
+        return Ended(np.inf, np.inf, f"broke off: {error}", landings, 0.0), None
     off = pose_error(run.object[-1], scene.goal)
     ended = Ended(float(np.hypot(*off[:2])), abs(float(off[2])), run.outcome, landings, float(run.times[-1]))
     return ended, run
