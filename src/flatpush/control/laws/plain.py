@@ -44,7 +44,7 @@ def nearest(table: Array, x: float, y: float, length: float, reach: float) -> An
         ahead, left = (x - px) * c + (y - py) * d, (y - py) * c - (x - px) * d
         step = ahead / max(0.2, 1 - bend * left)
         length = min(max(length + step, first - reach), first + reach)
-        if abs(step) < 1e-9:
+        if abs(step) < 1e-6:  # what is left is of second order
             break
     return length
 

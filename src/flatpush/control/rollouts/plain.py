@@ -87,7 +87,7 @@ def rollout(
     lx, ly, heading0, left, right = model[0], model[1], model[2], model[3], model[4]
     px, py, nx, ny = model[5], model[6], model[7], model[8]
     along, gap = 0.0, 0.0
-    s, length, worst, stuck, outcome = speed, 0.0, 0.0, 0, 0
+    s, out, length, worst, stuck, outcome = speed, 0.0, 0.0, 0.0, 0, 0
     finish = table[table.shape[0] - 1, 0] + table[table.shape[0] - 1, 1]
     for k in range(ticks):
         if way.shape[0] > 0:
@@ -106,7 +106,8 @@ def rollout(
             )  # fmt: skip
             off = math.hypot(x - zx, y - zy)
         else:
-            length = nearest(table, x, y, length, max(0.25 / max(left, right), 2 * speed * dt))
+            ahead = min(length + out * dt, finish)
+            length = nearest(table, x, y, ahead, max(0.25 / max(left, right), 2 * speed * dt))
             remaining = finish - length
             if remaining <= 1e-9:
                 outcome = 2
