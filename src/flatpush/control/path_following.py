@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..geometry.pose import Array
 from .controller import ARRIVED
 from .gains import limits
-from .laws.plain import along_path, nearest, place, wrapped
+from .laws.plain import along_path, nearest, wrapped
 from .measurement import STOP, Command
 from .push_controller import AbstractPushController, PushState, pusher_velocity
 from .reference import PathReference
@@ -43,9 +43,7 @@ def path_command(
     """Flat speed, ω, arc length abeam and whether the turn is at its limit; None where the end is abeam or behind."""
     x, y, heading = model.flat_of(pose)
     reach = 0.25 / max(model.left, model.right)
-    length = nearest(path.table, x, y, length, max(reach, 2 * speed * dt))
-    px, py, angle, bend = place(path.table, length)
-    left = (y - py) * np.cos(angle) - (x - px) * np.sin(angle)
+    length, left, angle, bend = nearest(path.table, x, y, length, max(reach, 2 * speed * dt))
     psi = wrapped(heading - angle)
     remaining = path.length - length
     if remaining <= 1e-9:

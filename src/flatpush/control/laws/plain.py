@@ -36,17 +36,23 @@ def place(table: Array, length: float) -> Any:
 
 
 def nearest(table: Array, x: float, y: float, length: float, reach: float) -> Any:
-    """Arc length of the path's point abeam of (x, y), near a first guess, at most `reach` from it."""
+    """The path's point abeam of (x, y), near a first guess of its arc length, at most `reach` from it.
+
+    Returns:
+        arc length, how far (x, y) is to the left of it, tangent's angle and curvature there.
+    """
     first = length
     for _ in range(6):
         px, py, angle, bend = place(table, length)
         c, d = math.cos(angle), math.sin(angle)
         ahead, left = (x - px) * c + (y - py) * d, (y - py) * c - (x - px) * d
         step = ahead / max(0.2, 1 - bend * left)
-        length = min(max(length + step, first - reach), first + reach)
+        step = min(max(length + step, first - reach), first + reach) - length
+        length += step
         if abs(step) < 1e-6:  # what is left is of second order
-            break
-    return length
+            return length, left, angle + bend * step, bend
+    px, py, angle, bend = place(table, length)
+    return length, (y - py) * math.cos(angle) - (x - px) * math.sin(angle), angle, bend
 
 
 def linearised(

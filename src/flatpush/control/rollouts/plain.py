@@ -107,13 +107,12 @@ def rollout(
             off = math.hypot(x - zx, y - zy)
         else:
             ahead = min(length + out * dt, finish)
-            length = nearest(table, x, y, ahead, max(0.25 / max(left, right), 2 * speed * dt))
+            reach = max(0.25 / max(left, right), 2 * speed * dt)
+            length, e, angle, bend = nearest(table, x, y, ahead, reach)
             remaining = finish - length
             if remaining <= 1e-9:
                 outcome = 2
                 break
-            zx, zy, angle, bend = place(table, length)
-            e = (y - zy) * math.cos(angle) - (x - zx) * math.sin(angle)
             psi = wrapped(heading - angle)
             kappa, _ = along_path(e, psi, bend, gains[0], gains[1], left, right)
             out = min(speed, remaining / (dt * max(0.2, math.cos(psi))))
@@ -127,13 +126,13 @@ def rollout(
             c, d = math.cos(qt), math.sin(qt)
             gap = max(0.0, gap - dt * ((c * ux + d * uy) * nx + (c * uy - d * ux) * ny))
             continue
-        turn, a, b, w, slip, mode = qt, 0.0, 0.0, 0.0, 0.0, 0
+        c0, d0 = math.cos(qt), math.sin(qt)
+        c, d, a, b, w, slip, mode = c0, d0, 0.0, 0.0, 0.0, 0.0, 0
         for _ in range(2):
-            c, d = math.cos(turn), math.sin(turn)
             a, b, w, slip, mode = contact_twist(A, cof, cx, cy, nx, ny, mu, c * ux + d * uy, c * uy - d * ux)
-            turn = qt + 0.5 * w * dt
+            c, d = math.cos(qt + 0.5 * w * dt), math.sin(qt + 0.5 * w * dt)
+        c, d = c0, d0
         if mode == SEPARATION:
-            c, d = math.cos(qt), math.sin(qt)
             gap = -dt * ((c * ux + d * uy) * nx + (c * uy - d * ux) * ny)
             continue
         stuck += 1 if mode == STICKING else 0
@@ -146,7 +145,6 @@ def rollout(
             (math.sin(turn) / turn, (1 - math.cos(turn)) / turn) if abs(turn) > 1e-6 else (1.0, 0.5 * turn)
         )
         ex, ey = dt * (sine * a - versine * b), dt * (versine * a + sine * b)
-        c, d = math.cos(qt), math.sin(qt)
         qx, qy, qt = qx + c * ex - d * ey, qy + d * ex + c * ey, qt + turn
     for k in range(way.shape[0]):
         if k == way.shape[0] - 1 or (outcome != 0 and np.isnan(way[k, 0])):
