@@ -24,14 +24,14 @@ def kernel(signature: object = None, *, fused: bool = False) -> Callable[[F], F]
     With a signature it is compiled (or read from disk) when its module is imported, without one when it is called.
     """
     options = _PLAIN | (_FUSED if fused else {})
-    return nb.njit(signature, cache=True, nogil=True, **options)  # type: ignore[no-any-return]
+    return nb.njit(signature, cache=True, nogil=True, **options)
 
 
 def inner(function: F) -> F:
     """Decorates a function that only kernels call: nothing is generated for Python."""
-    return nb.njit(**_PLAIN, **_WITHIN)(function)  # type: ignore[no-any-return]
+    return nb.njit(**_PLAIN, **_WITHIN)(function)
 
 
 def block(function: F) -> F:
     """Decorates a piece of a loop that LLVM vectorises: inlined before it looks for vectors."""
-    return nb.njit(forceinline=True, **_PLAIN, **_FUSED)(function)  # type: ignore[no-any-return]
+    return nb.njit(forceinline=True, **_PLAIN, **_FUSED)(function)
