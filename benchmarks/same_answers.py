@@ -1,0 +1,148 @@
+"""Whether two checkouts of flatpush give the same answers: the guard of every change of how the program is built.
+
+    python benchmarks/same_answers.py OLD NEW [--scenes N] [--first K] [--no-examples]
+
+OLD and NEW are folders of checkouts; their dependencies are those of this Python. Each plans the examples and N random
+scenes (`random_scenes.py`, by iterations and not by the clock) in one process and simulates what it planned. Status,
+words, pushes, cost, certificate, simulated end and outcome are compared: numbers within 1e-9 (absolute below one,
+relative above). Every difference is printed with its scene and field; the exit status is 1 if there is one. What a
+clean commit answered is kept in the system's folder for temporary files and not computed again.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+TOLERANCE = 1e-9
+HERE = Path(__file__).parent
+
+
+def answer(scene: object) -> dict[str, object]:
+    """What the flatpush of this process answers to a scene document or the path of one; runs inside a checkout."""
+    import flatpush as fp
+    from flatpush.errors import FlatpushError
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "scene.json")
+        if isinstance(scene, dict):
+            file.write_text(json.dumps(scene))
+        else:
+            file = Path(str(scene))
+        try:
+            plan = fp.plan(fp.load_scene(file))
+            if plan.status != "solved":
+                return {"status": plan.status}
+            saved = Path(folder, "plan.json")
+            plan.save(saved)
+            certificate = json.loads(saved.read_text())["certificate"]
+            end = fp.simulate(plan, seed=None)
+        except FlatpushError as error:
+            return {"status": "refused", "error": type(error).__name__}
+        except Exception as error:  # what a comparison must not stop at
+            return {"status": "failed", "error": repr(error)}
+    return {
+        "status": plan.status,
+        "cost": plan.cost,
+        "duration": plan.duration,
+        "pushes": [s.push for s in plan.pushes],
+        "words": [s.word for s in plan.pushes],
+        "certificate": certificate,
+        "end": [float(x) for x in end.final_pose],
+        "outcome": end.outcome,
+    }
+
+
+def work(seeds: range, examples: bool) -> None:
+    """Prints one JSON line a scene."""
+    sys.path.insert(0, str(HERE))
+    from random_scenes import scene
+
+    cases: list[tuple[str, object]] = [(f"random {seed}", scene(seed)) for seed in seeds]
+    if examples:
+        cases += [(path.name, path) for path in sorted(Path("examples").glob("*.yaml"))]
+    for name, case in cases:
+        print(json.dumps({"name": name, **answer(case)}), flush=True)
+
+
+def differences(old: object, new: object, where: str = "") -> list[str]:
+    """The fields in which two answers differ by more than the tolerance."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = [*old, *(k for k in new if k not in old)]
+        return [d for k in keys for d in differences(old.get(k), new.get(k), f"{where}.{k}".lstrip("."))]
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        return [
+            d
+            for i, (a, b) in enumerate(zip(old, new, strict=True))
+            for d in differences(a, b, f"{where}[{i}]")
+        ]
+    if isinstance(old, float | int) and isinstance(new, float | int) and not isinstance(old, bool):
+        same = old == new or abs(old - new) <= TOLERANCE * max(1.0, abs(old)) or (old != old and new != new)
+        return [] if same else [f"{where}: {old!r} -> {new!r}"]
+    return [] if old == new else [f"{where}: {old!r} -> {new!r}"]
+
+
+def answers(checkout: Path, arguments: argparse.Namespace) -> dict[str, dict[str, object]]:
+    """By name; from what is kept, if the checkout is clean."""
+    git = ["git", "-C", str(checkout)]
+    commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True).stdout.strip()
+    clean = not subprocess.run([*git, "status", "--porcelain"], capture_output=True, text=True).stdout.strip()
+    kept = Path(tempfile.gettempdir(), f"flatpush-answers-{commit}.json")
+    known: dict[str, dict[str, object]] = json.loads(kept.read_text()) if kept.exists() and clean else {}
+    wanted = {f"random {s}" for s in range(arguments.first, arguments.first + arguments.scenes)}
+    if arguments.examples:
+        wanted |= {path.name for path in (checkout / "examples").glob("*.yaml")}
+    if wanted - set(known):
+        command = [sys.executable, str(HERE / "same_answers.py"), "--work", *sys.argv[1:]]
+        environment = os.environ | {"PYTHONPATH": str(checkout / "src")}
+        with subprocess.Popen(
+            command, cwd=checkout, env=environment, stdout=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdout is not None
+            for count, line in enumerate(process.stdout, 1):
+                row = json.loads(line)
+                known[row["name"]] = row
+                print(f"\r{checkout.name}: {count} of {len(wanted)}", end="", file=sys.stderr, flush=True)
+        print(file=sys.stderr)
+        if process.returncode:
+            raise SystemExit(f"{checkout}: ended with status {process.returncode}")
+        if clean:
+            kept.write_text(json.dumps(known))
+    return {name: known[name] for name in sorted(wanted)}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("old", type=Path)
+    parser.add_argument("new", type=Path)
+    parser.add_argument("--scenes", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--no-examples", dest="examples", action="store_false")
+    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.work:
+        work(range(arguments.first, arguments.first + arguments.scenes), arguments.examples)
+        return 0
+    old, new = (answers(path.resolve(), arguments) for path in (arguments.old, arguments.new))
+    different, cheaper, dearer = 0, 0, 0
+    for name in old:
+        found = differences(old[name], new[name])
+        if found:
+            different += 1
+            a, b = old[name].get("cost"), new[name].get("cost")
+            if isinstance(a, float) and isinstance(b, float) and not math.isclose(a, b, rel_tol=1e-9):
+                cheaper, dearer = cheaper + (b < a), dearer + (b > a)
+            print(f"{name}: {'; '.join(found[:4])}{f' and {len(found) - 4} more' if len(found) > 4 else ''}")
+    solved = sum(row["status"] == "solved" for row in new.values())
+    print(
+        f"{len(old)} scenes, {solved} solved; {different} differ, {cheaper} of them cheaper now and {dearer} dearer"
+    )
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
