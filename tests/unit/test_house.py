@@ -90,3 +90,11 @@ def test_no_sentence_of_the_documents_is_cut():
             if part.count("(") != part.count(")") or part.count("**") % 2:
                 cut.append((page.name, part))
     assert not cut
+
+
+def test_every_citation_is_resolved_on_one_page():
+    key = re.compile(r"\[([A-Z][A-Za-z]+[12]\d{3}[a-z]?)\]")
+    listed = set(key.findall((ROOT / "docs" / "references.md").read_text(encoding="utf-8")))
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "src").rglob("*.py")]
+    used = {k for page in pages for k in key.findall(page.read_text(encoding="utf-8"))}
+    assert used == listed
