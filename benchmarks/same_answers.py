@@ -6,7 +6,7 @@ OLD and NEW are folders of checkouts; their dependencies are those of this Pytho
 scenes (`random_scenes.py`, by iterations and not by the clock) in one process and simulates what it planned. Status,
 words, pushes, cost, certificate, simulated end and outcome are compared: numbers within 1e-9 (absolute below one,
 relative above). Every difference is printed with its scene and field; the exit status is 1 if there is one. What a
-clean commit answered is kept in the system's folder for temporary files and not computed again.
+clean commit answered is kept in the system's folder for temporary files, scene by scene, and not computed again.
 """
 
 import argparse
@@ -57,15 +57,15 @@ def answer(scene: object) -> dict[str, object]:
     }
 
 
-def work(seeds: range, examples: bool) -> None:
-    """Prints one JSON line a scene."""
+def work() -> None:
+    """Answers the scenes that standard input names, one JSON line a scene."""
     sys.path.insert(0, str(HERE))
     from random_scenes import scene
 
-    cases: list[tuple[str, object]] = [(f"random {seed}", scene(seed)) for seed in seeds]
-    if examples:
-        cases += [(path.name, path) for path in sorted(Path("examples").glob("*.yaml"))]
-    for name, case in cases:
+    for line in sys.stdin:
+        name = line.strip()
+        seed = name.removeprefix("random ")
+        case: object = scene(int(seed)) if seed != name else Path("examples", name)
         print(json.dumps({"name": name, **answer(case)}), flush=True)
 
 
@@ -91,27 +91,36 @@ def answers(checkout: Path, arguments: argparse.Namespace) -> dict[str, dict[str
     git = ["git", "-C", str(checkout)]
     commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True).stdout.strip()
     clean = not subprocess.run([*git, "status", "--porcelain"], capture_output=True, text=True).stdout.strip()
-    kept = Path(tempfile.gettempdir(), f"flatpush-answers-{commit}.json")
-    known: dict[str, dict[str, object]] = json.loads(kept.read_text()) if kept.exists() and clean else {}
-    wanted = {f"random {s}" for s in range(arguments.first, arguments.first + arguments.scenes)}
+    kept = Path(tempfile.gettempdir(), f"flatpush-answers-{commit}.jsonl") if clean else Path(os.devnull)
+    rows = map(json.loads, kept.read_text().splitlines() if kept.exists() else [])
+    known: dict[str, dict[str, object]] = {row["name"]: row for row in rows}
+    wanted = [f"random {s}" for s in range(arguments.first, arguments.first + arguments.scenes)]
     if arguments.examples:
-        wanted |= {path.name for path in (checkout / "examples").glob("*.yaml")}
-    if wanted - set(known):
-        command = [sys.executable, str(HERE / "same_answers.py"), "--work", *sys.argv[1:]]
+        wanted += [path.name for path in sorted((checkout / "examples").glob("*.yaml"))]
+    missing = [name for name in wanted if name not in known]
+    if missing:
+        command = [sys.executable, str(HERE / "same_answers.py"), "--work", ".", "."]
         environment = os.environ | {"PYTHONPATH": str(checkout / "src")}
-        with subprocess.Popen(
-            command, cwd=checkout, env=environment, stdout=subprocess.PIPE, text=True
-        ) as process:
+        pipe = subprocess.PIPE
+        with (
+            open(kept, "a") as file,
+            subprocess.Popen(
+                command, cwd=checkout, env=environment, stdin=pipe, stdout=pipe, text=True
+            ) as process,
+        ):
+            assert process.stdin is not None
             assert process.stdout is not None
+            process.stdin.write("\n".join(missing) + "\n")
+            process.stdin.close()
             for count, line in enumerate(process.stdout, 1):
+                file.write(line)
+                file.flush()
                 row = json.loads(line)
                 known[row["name"]] = row
-                print(f"\r{checkout.name}: {count} of {len(wanted)}", end="", file=sys.stderr, flush=True)
+                print(f"\r{checkout.name}: {count} of {len(missing)}", end="", file=sys.stderr, flush=True)
         print(file=sys.stderr)
         if process.returncode:
             raise SystemExit(f"{checkout}: ended with status {process.returncode}")
-        if clean:
-            kept.write_text(json.dumps(known))
     return {name: known[name] for name in sorted(wanted)}
 
 
@@ -125,7 +134,7 @@ def main() -> int:
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work:
-        work(range(arguments.first, arguments.first + arguments.scenes), arguments.examples)
+        work()
         return 0
     old, new = (answers(path.resolve(), arguments) for path in (arguments.old, arguments.new))
     different, cheaper, dearer = 0, 0, 0
