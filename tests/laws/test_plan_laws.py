@@ -144,6 +144,7 @@ def test_moving_the_scene_moves_the_plan(triangle):
     assert pose_error(b.pushes[0].object, compose(X, a.pushes[0].object)) == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
     start, pusher = (0.0, -0.1, 0.0), fp.Pusher(fingers=2, spacing=0.018)
     free = fp.plan(fp.Scene(triangle, start, pusher=pusher))

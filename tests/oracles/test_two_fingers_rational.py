@@ -206,6 +206,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ellipsoid", "quartic", "feet", "resting foot"])
 def test_membership_agrees_with_exact_arithmetic(kind):
     assert len(CASES) == 500
