@@ -105,13 +105,13 @@ def test_a_push_that_follows_itself_does_not_let_go(rectangle, fingers):
     found = fp.Plan(
         "solved",
         planner.scene,
-        certificate["cost"],
-        certificate["duration"],
+        certificate.cost,
+        certificate.duration,
         segments,
-        fp.Certificate(certificate),
+        certificate,
     )
     assert fp.verify(found).ok, fp.verify(found).failed
-    assert certificate["cost"] == pytest.approx(sum(arc.cost for push in found.pushes for arc in push.arcs))
+    assert certificate.cost == pytest.approx(sum(arc.cost for push in found.pushes for arc in push.arcs))
     rollout = fp.simulate(found)
     assert rollout.outcome == "completed"
     distance, turn = final_error(rollout, scene.goal)

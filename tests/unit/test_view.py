@@ -16,6 +16,7 @@ from flatpush.errors import InputError
 from flatpush.geometry import Outline, compose, exp, inverse, transform
 from flatpush.problem import (
     Arc,
+    CarCentres,
     Certificate,
     Object,
     Plan,
@@ -95,9 +96,9 @@ def make_plan(
         (Push(push, at, 2, 0.018),),
         Workspace(**workspace),
     )
-    car = {push: {"left_centre": LEFT.tolist(), "right_centre": RIGHT.tolist(), "straight": [0.0, 1.0]}}
-    certificate = Certificate({"cars": car} if cars else {})
+    car = {push: CarCentres(tuple(LEFT), tuple(RIGHT), (0.0, 1.0))}
     duration = float(sum(s.times[-1] for s in segments))
+    certificate = Certificate((0.0, 0.0, 0.0), 0.18 * pushes, duration, cars=car if cars else {})
     return Plan("solved", scene, 0.18 * pushes, duration, tuple(segments), certificate)
 
 

@@ -43,7 +43,7 @@ class WrenchCone:
     @classmethod
     def of(cls, contacts: Sequence[PointContact]) -> "WrenchCone":
         """The cone of contacts in one frame, whose origin is the centre of friction."""
-        return cls.spanned([c.wrench(f) for c in contacts for f in c.force_edges()], _lever(contacts))
+        return cls.spanned([c.wrench(f) for c in contacts for f in c.force_edges()], lever_of(contacts))
 
     @classmethod
     def spanned(cls, wrenches: ArrayLike, lever: float) -> "WrenchCone":
@@ -149,14 +149,14 @@ def narrowed(contacts: Sequence[PointContact], margin: float, straight: ArrayLik
     first, second = np.array(edges)
     own, other = 1 - 0.5 * margin, 0.5 * margin
     shared = np.concatenate([own * first + other * second, other * first + own * second])
-    return WrenchCone.spanned(shared, _lever(contacts))
+    return WrenchCone.spanned(shared, lever_of(contacts))
 
 
 def shared(contacts: Sequence[PointContact], share: float) -> WrenchCone:
     """The composite cone of two contacts of which each bears at least a share (0 to 1/2) of the push."""
     first, second = np.array([[c.wrench(f) for f in c.force_edges()] for c in contacts])
     wrenches = np.concatenate([(1 - share) * first + share * second, share * first + (1 - share) * second])
-    return WrenchCone.spanned(wrenches, _lever(contacts))
+    return WrenchCone.spanned(wrenches, lever_of(contacts))
 
 
 def straight_wrenches(cone: WrenchCone, surface: LimitSurface) -> tuple[Array, Array] | None:
@@ -193,7 +193,8 @@ def _straight_between(surface: LimitSurface, F: Array, G: Array) -> Array:
     return 0.5 * (low + high)
 
 
-def _lever(contacts: Sequence[PointContact]) -> float:
+def lever_of(contacts: Sequence[PointContact]) -> float:
+    """The unit of length for torques: the distance of the farthest contact from the centre of friction [m]."""
     return max(float(np.max([np.hypot(*c.point) for c in contacts])), 1e-300)
 
 

@@ -4,15 +4,16 @@ import json
 import math
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from ..problem import Arc, Certificate, Plan, PushSegment, TransitSegment
+from ..problem import Arc, CarCentres, Certificate, Plan, PushSegment, TransitSegment
 from .atomic import write_atomically
-from .plan_model import PlanModel, PushSegmentPart, TransitSegmentPart
+from .plan_model import CertificatePart, NoCertificatePart, PlanModel, PushSegmentPart, TransitSegmentPart
 from .reading import join, plain, read_mapping
 from .refusals import checked
 from .scene_reader import parse_scene
@@ -45,7 +46,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "duration": _finite(plan.duration, "duration"),
         "run": _open(plan.run),
         "segments": [_segment(s, join("segments", i)) for i, s in enumerate(plan.segments)],
-        "certificate": _open(plan.certificate),
+        "certificate": {} if plan.certificate is None else _certificate(plan.certificate),
     }
 
 
@@ -87,7 +88,7 @@ def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:
         cost=float("nan") if model.cost is None else model.cost,
         duration=model.duration,
         segments=tuple(_read_segment(s, join("segments", i), source) for i, s in enumerate(model.segments)),
-        certificate=Certificate(model.certificate),
+        certificate=_read_certificate(model.certificate),
         reason=model.reason,
         run=model.run,
     )
@@ -169,6 +170,25 @@ def _read_segment(
         pusher=np.array(part.pusher, dtype=float),
         fingers=np.array(part.fingers, dtype=float),
     )
+
+
+def _certificate(certificate: Certificate) -> dict[str, Any]:
+    values = asdict(certificate)
+    return _open(values | values.pop("others"))
+
+
+def _read_certificate(part: CertificatePart | NoCertificatePart) -> Certificate | None:
+    if isinstance(part, NoCertificatePart):
+        return None
+    values = part.model_dump()
+    others = {key: values.pop(key) for key in list(values) if key not in CertificatePart.model_fields}
+    values["goal_error"] = tuple(values["goal_error"])
+    values["warnings"] = tuple(values["warnings"])
+    values["cars"] = {
+        name: CarCentres(**{key: tuple(pair) for key, pair in car.items()})
+        for name, car in values["cars"].items()
+    }
+    return Certificate(**values, others=others)
 
 
 def _finite(value: float, key: str) -> float:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from .scene_model import Finite, Part, Text
 
@@ -55,6 +55,50 @@ SegmentForm = Annotated[
 ]
 
 
+class CarPart(Part):
+    """How a push steers, in O."""
+
+    left_centre: Vector2 = Field(description="The centre of its tightest left turn.")
+    right_centre: Vector2 = Field(description="The centre of its tightest right turn.")
+    straight: Vector2 = Field(description="The unit direction of its straight motion.")
+
+
+class CertificatePart(BaseModel):
+    """What was proved or measured; null where it does not apply. A later version may know more keys."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True)
+
+    goal_error: Vector3 = Field(description="The final pose less the goal.")
+    cost: Finite = Field(description="In the unit of the scene's cost.")
+    duration: Time = Field(description="Seconds.")
+    friction_margin: Finite | None = Field(default=None, description="The fraction of μ that can be lost.")
+    friction_margin_degrees: Finite | None = Field(default=None, description="The same as an angle.")
+    spacing_margin: Finite | None = Field(default=None, description="The part of the spacing to lose.")
+    motion_cone_margin_degrees: Finite | None = Field(
+        default=None, description="From the pusher's velocity to the edge of the motion cone."
+    )
+    curvature_margin: Finite | None = Field(default=None, description="1 - turn / the tightest turn.")
+    composite_margin: Finite | None = Field(default=None, description="Of both contacts together.")
+    uniqueness_margin: Finite | None = Field(default=None, description="Turning centres beyond the object.")
+    model_offset: Finite | None = Field(default=None, description="Of the believed line of force.")
+    growth: Finite | None = Field(default=None, description="The factor by which a small error grows.")
+    clearance: Finite | None = Field(default=None, description="To obstacles and bounds.")
+    cars: dict[str, CarPart] = Field(default_factory=dict, description="Of each push used, by its name.")
+    warnings: list[str] = Field(default=[], description="In words.")
+
+
+class NoCertificatePart(Part):
+    """What stands for a certificate without a plan."""
+
+
+CertificateForm = Annotated[
+    Annotated[CertificatePart, Tag("<full>")] | Annotated[NoCertificatePart, Tag("<none>")],
+    Discriminator(
+        lambda value: "<none>" if value == {} or isinstance(value, NoCertificatePart) else "<full>"
+    ),
+]
+
+
 class PlanModel(Part):
     """A plan: what was asked, and what is answered."""
 
@@ -66,4 +110,6 @@ class PlanModel(Part):
     duration: Time = Field(description="Seconds.")
     run: dict[str, Any] = Field(default_factory=dict, description="Version and planning time; not compared.")
     segments: list[SegmentForm] = Field(description="Pushes and transits in order.")
-    certificate: dict[str, Any] = Field(default_factory=dict, description="What was proved or measured.")
+    certificate: CertificateForm = Field(
+        default=NoCertificatePart(), description="What was proved or measured; empty without a plan."
+    )

@@ -25,7 +25,8 @@ Fingers = Annotated[int, Field(ge=1, le=2)]
 class Part(BaseModel):
     """A mapping whose keys are all known."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    # Only the document's own model is built, with all its parts, when it is first used.
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod

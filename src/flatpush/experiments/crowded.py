@@ -149,12 +149,13 @@ def run(figures: Path | None) -> str:
         planner = Planner(make(), tree=False)
         plan = planner.plan()
         count = len(plan.scene.workspace.obstacles)
-        if plan.status != "solved":
+        if plan.certificate is None:
             rows.append(f"{name:<16} {count:9d}  {plan.reason}")
             continue
-        first = 1e3 * plan.run["first_path_time"]
+        first = 1e3 * float(plan.run["first_path_time"] or 0.0)
         rows.append(
-            f"{name:<16} {count:9d}  {first:7.1f} ms  {plan.cost:.3f} m  {1e3 * plan.certificate.clearance:.2f} mm"
+            f"{name:<16} {count:9d}  {first:7.1f} ms  {plan.cost:.3f} m"
+            f"  {1e3 * (plan.certificate.clearance or 0.0):.2f} mm"
         )
         if figures is not None:
             from ..view import save_figure

@@ -10,7 +10,7 @@ from ..errors import InputError
 from .pose import Array, cross, perpendicular
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OutlinePoint:
     """A point of an outline.
 

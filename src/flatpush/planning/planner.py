@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import FlatpushError
 from ..geometry import pose_error
 from ..geometry.pose import Array
-from ..problem import Certificate, Plan, Scene
+from ..problem import Plan, Scene
 from ..simulation import certify
 from ..steering.fleet import Fleet
 from .answer import Answer
@@ -252,10 +252,10 @@ def _solved(scene: Scene, segments: Segments, began: float, found: dict[str, Any
     return Plan(
         "solved",
         scene,
-        certificate["cost"],
-        certificate["duration"],
+        certificate.cost,
+        certificate.duration,
         segments,
-        Certificate(certificate),
+        certificate,
         run=run,
     )
 

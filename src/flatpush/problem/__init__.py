@@ -1,10 +1,12 @@
 """What is asked and what is answered, as plain values."""
 
-from .plan import Arc, Certificate, Plan, PushSegment, Rollout, TransitSegment
+from .certificate import CarCentres, Certificate
+from .plan import Arc, Plan, PushSegment, Rollout, TransitSegment
 from .scene import Object, Planning, Push, Pusher, Scene, Workspace
 
 __all__ = [
     "Arc",
+    "CarCentres",
     "Certificate",
     "Object",
     "Plan",

@@ -7,9 +7,9 @@ import numpy as np
 from ..contact import Placement, PointContact, cone_twists, place_fingers
 from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
-from ..geometry import OutlinePoint
+from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
-from .scene import Model, Object, Push, Scene
+from .scene import Cost, Model, Object, Push, Scene
 
 
 def named(scene: Scene, name: str) -> Push:
@@ -22,16 +22,12 @@ def named(scene: Scene, name: str) -> Push:
 
 def placement_of(scene: Scene, push: Push) -> Placement:
     """The fingertips of a push, in O. Raises InputError where they do not fit."""
-    return place_fingers(scene.object.outline, push.at, push.fingers, push.spacing, scene.pusher.tip_radius)
+    return _placed(scene.object.outline, push.at, push.fingers, push.spacing, scene.pusher.tip_radius)
 
 
 def contacts_of(scene: Scene, placement: Placement) -> tuple[PointContact, ...]:
     """The contacts of the fingertips as they are, in B (O's axes, origin at the COF)."""
-    mu, cof = scene.object.friction, scene.object.cof
-    return tuple(
-        PointContact(point - cof, normal, mu, hook=True)
-        for point, normal in zip(placement.points, placement.normals, strict=True)
-    )
+    return _contacts(scene.object, placement)
 
 
 def virtual_contact(scene: Scene, placement: Placement) -> PointContact:
@@ -59,15 +55,8 @@ def cone_motions(
     They suit the scene's cost; the margin is the scene's unless given. See contact.cone_twists.
     """
     planning = scene.planning
-    places = placement.tips if planning.cost == "time" else placement.pose[None, :2]
-    return cone_twists(
-        contacts_of(scene, placement),
-        surface,
-        planning.friction_margin if margin is None else margin,
-        places - scene.object.cof,
-        planning.cost,
-        quick=quick,
-    )
+    share = planning.friction_margin if margin is None else margin
+    return _cone_motions(scene.object, placement, surface, share, planning.cost, quick)
 
 
 def slider_of(thing: Object) -> Array:
@@ -120,6 +109,29 @@ def divergence_length(thing: Object, contact: PointContact) -> float:
     """L = r + ρ/r [m]: a small error of the bearing contact → COF grows e-fold per L of travel of one finger."""
     r = float(np.hypot(*contact.point))
     return r + local_rho(thing, -contact.point / r) / r
+
+
+def _contacts(thing: Object, placement: Placement) -> tuple[PointContact, ...]:
+    return tuple(
+        PointContact(point - thing.cof, normal, thing.friction, hook=True)
+        for point, normal in zip(placement.points, placement.normals, strict=True)
+    )
+
+
+@lru_cache(maxsize=256)
+def _placed(outline: Outline, at: OutlinePoint, fingers: int, spacing: float, tip_radius: float) -> Placement:
+    return place_fingers(outline, at, fingers, spacing, tip_radius)
+
+
+@lru_cache(maxsize=256)
+def _cone_motions(
+    thing: Object, placement: Placement, surface: LimitSurface, margin: float, cost: Cost, quick: bool
+) -> Array:
+    places = placement.tips if cost == "time" else placement.pose[None, :2]
+    contacts = _contacts(thing, placement)
+    motions = cone_twists(contacts, surface, margin, places - thing.cof, cost, quick=quick)
+    motions.setflags(write=False)
+    return motions
 
 
 @lru_cache(maxsize=64)

@@ -1,13 +1,14 @@
 """What is answered: a plan of pushes and transits, and the rollout of one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from ..geometry.pose import Array
+from .certificate import Certificate
 from .scene import Scene
 
 
@@ -62,31 +63,6 @@ class TransitSegment:
     kind: Literal["transit"] = "transit"
 
 
-class Certificate(Mapping[str, Any]):
-    """What was proved or measured about a plan; read as certificate["goal_error"] or certificate.goal_error."""
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values = dict(values)
-
-    def __getitem__(self, key: str) -> Any:
-        return self._values[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self.__dict__["_values"][name]
-        except KeyError:
-            raise AttributeError(f"the certificate has no {name!r}") from None
-
-    def __repr__(self) -> str:
-        return f"Certificate({self._values!r})"
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A plan; its attributes are the keys of the plan document.
@@ -97,7 +73,7 @@ class Plan:
         cost: in the unit of scene.planning.cost; nan without a plan.
         duration: [s].
         segments: pushes and transits in order; empty when start and goal are equal.
-        certificate: see simulation.claims.
+        certificate: what was proved or measured; None without a plan.
         reason: why there is no plan, and what to try.
         run: version and planning time; not part of what two plans are compared by.
     """
@@ -107,9 +83,9 @@ class Plan:
     cost: float = float("nan")
     duration: float = 0.0
     segments: tuple[PushSegment | TransitSegment, ...] = ()
-    certificate: Certificate = field(default_factory=lambda: Certificate({}))
+    certificate: Certificate | None = None
     reason: str = ""
-    run: Mapping[str, Any] = field(default_factory=dict)
+    run: Mapping[str, float | str | None] = field(default_factory=dict)
 
     @property
     def pushes(self) -> tuple[PushSegment, ...]:
@@ -117,7 +93,7 @@ class Plan:
 
     def save(self, path: str | Path) -> None:
         """Writes the plan document (JSON, SI), whole or not at all."""
-        from ..documents import save_plan
+        from ..documents.plan_file import save_plan
 
         save_plan(self, path)
 

@@ -14,6 +14,7 @@ from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 
 Model = Literal["exact", "ellipsoid", "local", "quartic"]
+Cost = Literal["flat", "pusher", "time"]
 MODELS: tuple[Model, ...] = ("exact", "ellipsoid", "local", "quartic")
 
 
@@ -164,7 +165,7 @@ class Planning:
 
     model: Model = "exact"
     two_finger: Literal["cone", "middle"] = "cone"
-    cost: Literal["flat", "pusher", "time"] = "flat"
+    cost: Cost = "flat"
     switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
     friction_margin: float = 0.2
     clearance: float = 0.0

@@ -9,72 +9,86 @@ from ..contact.wrench_cone import CLOSED
 from ..friction.surface import LimitSurface
 from ..geometry import rotate, velocity_at
 from ..geometry.pose import Array
+from .margins import Margins
 
 # Motions looked at on the way out of the cone, before the first one outside is found by refining.
-STEPS, ROUNDS = 64, 6
+STEPS = 64
 # No cone turns an object more tightly than this many times another motion that matters.
 TIGHTEST = 64.0
+# The first motion outside is found to within this part of the way [rad, or of the logarithm of ω].
+RESOLVED = 1e-12
 
 
 def cone_margins(
     contacts: Sequence[PointContact], surface: LimitSurface, point: Array, twist: Array
-) -> dict[str, float]:
-    """The margins of one twist about the COF; all of them negative outside the cone.
+) -> Margins:
+    """The margins of one twist (3,) about the COF, all of them negative outside the cone.
+
+    The velocity of the middle may turn by `motion` while ω stays; `curvature` is 1 - ω / the largest ω of its sign with
+    the same velocity of the middle.
 
     Args:
         contacts: the two, about the COF.
-        point: their middle, whose velocity is turned and kept.
-
-    Returns:
-        friction: fraction of μ that can be lost; degrees: the same as an angle of the friction cones' edges.
-        spacing: fraction of the fingers' distance that can be lost.
-        motion: angle by which the velocity of the middle may turn while ω stays [deg].
-        curvature: 1 - ω / the largest ω of its sign with the same velocity of the middle.
+        point: their middle (2,), whose velocity is turned and kept [m].
     """
     mu = contacts[0].friction
     cone = WrenchCone.of(contacts)
     friction = composite_margin(contacts, surface, twist)
-    kept = np.arctan(mu * min(max(1 - friction, 0.0), 10.0))
     u = velocity_at(twist, point)
 
-    def depth(V: Array) -> Array:
-        return cone.depth(surface.wrench(V))
+    def depths(ways: Array) -> Array:
+        """Of the motions turned left and right by an angle, and turning more tightly by a logarithm, (3, n)."""
+        left, right, log = ways
+        velocities = np.concatenate([rotate(left, u), rotate(-right, u), np.tile(u, (len(log), 1))])
+        omega = twist[2] * np.concatenate([np.ones(2 * len(log)), np.exp(log)])
+        return cone.depth(surface.wrench(_about(point, velocities, omega))).reshape(3, -1) + CLOSED
 
-    def left(angles: Array) -> Array:
-        return depth(_about(point, np.array([rotate(a, u) for a in angles]), np.full(len(angles), twist[2])))
+    if friction >= -CLOSED:
+        left, right, tighter = _reach(depths, np.array([np.pi, np.pi, np.log(TIGHTEST)]))
+        motion = min(left, right)
+        curvature = 1 - float(np.exp(-tighter)) if twist[2] != 0 else 1.0
+    else:
+        motion, curvature = -np.pi, -np.inf
+    return Margins(
+        friction=friction,
+        degrees=float(np.rad2deg(np.arctan(mu) - np.arctan(mu * max(1 - friction, 0.0)))),
+        spacing=spacing_margin(contacts, surface, twist),
+        motion=float(np.rad2deg(motion)),
+        curvature=curvature,
+    )
 
-    def right(angles: Array) -> Array:
-        return left(-angles)
 
-    def tighter(logs: Array) -> Array:
-        return _about(point, np.tile(u, (len(logs), 1)), twist[2] * np.exp(logs))
+def _reach(depths: Callable[[Array], Array], limits: Array) -> Array:
+    """The first values from 0 on several ways (m,) at which a depth becomes negative, up to a limit each.
 
-    sticks = friction >= -1e-9
-    motion = min(_reach(left, np.pi), _reach(right, np.pi)) if sticks else -np.pi
-    curvature = 1.0
-    if twist[2] != 0:
-        curvature = (
-            1 - float(np.exp(-_reach(lambda t: depth(tighter(t)), np.log(TIGHTEST)))) if sticks else -9.0
+    Looked for in equal steps, then by the Illinois form of the false position on all ways at once.
+    """
+    values = limits[:, None] * np.arange(1, STEPS + 1) / STEPS
+    found = depths(values)
+    outside = found < 0
+    first = np.where(outside.any(axis=1), outside.argmax(axis=1), STEPS - 1)
+    ways = np.arange(len(limits))
+    high, at_high = values[ways, first], found[ways, first]
+    low = np.where(first > 0, values[ways, first - 1], 0.0)
+    at_low = np.where(first > 0, found[ways, first - 1], depths(np.zeros((len(limits), 1)))[:, 0])
+    open_ = outside.any(axis=1) & (at_low > 0)
+    low = np.where(outside.any(axis=1), low, limits)
+    side = np.zeros(len(limits))
+    for _ in range(100):
+        if not np.any(open_ & (high - low > RESOLVED * limits)):
+            break
+        middle = np.where(
+            open_, (low * at_high - high * at_low) / np.where(open_, at_high - at_low, 1.0), low
         )
-    return {
-        "friction": friction,
-        "degrees": float(np.rad2deg(np.arctan(mu) - kept)),
-        "spacing": spacing_margin(contacts, surface, twist),
-        "motion": float(np.rad2deg(motion)),
-        "curvature": curvature,
-    }
-
-
-def _reach(depth: Callable[[Array], Array], limit: float) -> float:
-    """The first value from 0 at which a depth becomes negative, up to a limit."""
-    low, high = 0.0, limit
-    for _ in range(ROUNDS):
-        values = np.linspace(low, high, STEPS + 1)[1:]
-        outside = np.flatnonzero(depth(values) < -CLOSED)
-        if len(outside) == 0:
-            return high
-        k = int(outside[0])
-        low, high = (low if k == 0 else float(values[k - 1])), float(values[k])
+        middle = np.clip(middle, low, high)
+        at = depths(middle[:, None])[:, 0]
+        inside = at >= 0
+        # The end that stayed twice running counts half, so that the bracket closes from both sides.
+        at_low = np.where(inside, at, np.where(side == -1, 0.5 * at_low, at_low))
+        at_high = np.where(inside, np.where(side == 1, 0.5 * at_high, at_high), at)
+        low, high = np.where(inside & open_, middle, low), np.where(~inside & open_, middle, high)
+        side = np.where(inside, 1, -1)
+        open_ = open_ & (np.abs(at) > 1e-15)
     return low
 
 

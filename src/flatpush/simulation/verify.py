@@ -1,12 +1,13 @@
 """Recomputes every claim of a plan from its scene."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import FlatpushError, InputError
-from ..problem import Plan
+from ..problem import Certificate, Plan
 from .claims import arc_costs, certify, sample_errors
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
@@ -65,28 +66,23 @@ def verify(plan: Plan) -> Report:
             (Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense"),)
         )
     claims = [
-        _stated("cost", plan.cost, computed["cost"]),
-        _stated("duration", plan.duration, computed["duration"]),
+        _stated("cost", plan.cost, computed.cost),
+        _stated("duration", plan.duration, computed.duration),
     ]
-    claims += [_stated(key, plan.certificate.get(key), value) for key, value in computed.items()]
-    claims += [
-        _stated(key, value, computed.get(key))
-        for key, value in plan.certificate.items()
-        if key not in computed
-    ]
+    claims += _certified(plan.certificate, computed)
     claims += [
         _stated(f"word of {s.push}", s.word, "".join(a.turn[0].upper() for a in s.arcs)) for s in plan.pushes
     ]
     claims += [_arc_turns(plan), _arc_costs(plan, computed)]
-    goal = np.abs(computed["goal_error"])
+    goal = np.abs(computed.goal_error)
     tolerance = np.array(plan.scene.planning.goal_tolerance)
     excess = float(np.max(goal / tolerance))
     claims.append(Claim("reaches the goal", None, excess, 1.0, excess <= 1.0, "within the goal tolerance"))
     for key in ("friction_margin", "motion_cone_margin_degrees"):
-        value = computed[key]
+        value = getattr(computed, key)
         if value is not None:
             claims.append(Claim(f"{key} kept", None, value, 0.0, bool(value >= -ABSOLUTE), "not negative"))
-    clearance = computed["clearance"]
+    clearance = computed.clearance
     if clearance is not None:
         need = plan.scene.planning.clearance
         claims.append(
@@ -98,11 +94,22 @@ def verify(plan: Plan) -> Report:
     return Report(tuple(claims))
 
 
+def _certified(stated: Certificate | None, computed: Certificate) -> list[Claim]:
+    """A claim for each number of a certificate."""
+    if stated is None:
+        return [Claim("certificate", None, "one that can be computed", 0.0, False, "a plan has one")]
+    found, told = asdict(computed), asdict(stated)
+    unknown = [Claim(key, str(value), None, 0.0, False, "known") for key, value in told.pop("others").items()]
+    return [_stated(key, value, found[key]) for key, value in told.items()] + unknown
+
+
 def _stated(name: str, stated: Any, recomputed: Any) -> Claim:
     return Claim(name, stated, recomputed, RELATIVE, _agree(stated, recomputed))
 
 
 def _agree(a: Any, b: Any) -> bool:
+    if a is None and isinstance(b, float) and not math.isfinite(b):
+        return True  # a document writes null for what is not finite
     if isinstance(a, dict) and isinstance(b, dict):
         return a.keys() == b.keys() and all(_agree(a[k], b[k]) for k in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
@@ -118,7 +125,7 @@ def _arc_turns(plan: Plan) -> Claim:
     return Claim("turns", None, bad, 0.0, not bad, "each arc turns as it is named")
 
 
-def _arc_costs(plan: Plan, computed: dict[str, Any]) -> Claim:
+def _arc_costs(plan: Plan, computed: Certificate) -> Claim:
     stated = [[a.cost for a in s.arcs] for s in plan.pushes]
-    recomputed = [arc_costs(plan.scene, s, computed["cars"][s.push]) for s in plan.pushes]
+    recomputed = [arc_costs(plan.scene, s, computed.cars[s.push]) for s in plan.pushes]
     return _stated("arc costs", stated, recomputed)

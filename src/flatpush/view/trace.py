@@ -1,6 +1,5 @@
 """What a plan leaves on the table: outlines at even travel, fingertips, the path of the flat point."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,10 +113,9 @@ def _trace(plan: Plan, number: int, segment: PushSegment, travel: Array, step: f
 
 def _turning_centres(plan: Plan, segment: PushSegment) -> Array | None:
     """Centres of left and right turn in O, shape (2, 2): the certificate's, else those of the arcs."""
-    cars = plan.certificate.get("cars", {})
-    car = cars.get(segment.push) if isinstance(cars, Mapping) else None
+    car = None if plan.certificate is None else plan.certificate.cars.get(segment.push)
     if car is not None:
-        return np.array([car["left_centre"], car["right_centre"]], dtype=float)
+        return np.array([car.left_centre, car.right_centre])
     found = {arc.turn: turning_centre(arc) for arc in segment.arcs}
     if found.get("left") is None or found.get("right") is None:
         return None

@@ -1,0 +1,73 @@
+"""What was proved or measured about a plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class CarCentres:
+    """How a push steers, in O.
+
+    Attributes:
+        left_centre, right_centre: turning centres of its tightest left and right turn [m].
+        straight: unit direction of its straight motion.
+    """
+
+    left_centre: Vector
+    right_centre: Vector
+    straight: Vector
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The numbers that simulation.certify computes from a scene and its segments; None where one does not apply.
+
+    A margin that no friction and no spacing would give is -inf; the document writes it as null.
+
+    Attributes:
+        goal_error: final pose less the goal (x, y, θ) by integrating the arcs' twists [m, m, rad].
+        cost: recomputed, in the unit of the plan's cost: m, or s for the cost "time".
+        duration: of all segments [s].
+        friction_margin: worst over all twists, and over all forces consistent with each: the fraction of μ that can
+            be lost before the contact slips, under the planning model (two fingers in the middle: the virtual
+            contact; two fingers with their cone: before the twist leaves it).
+        friction_margin_degrees: the same as an angle between force and cone edge [deg].
+        spacing_margin: two fingers with their cone: the fraction of their spacing that can be lost likewise, or twice
+            the part of the load that the lighter finger bears at least.
+        motion_cone_margin_degrees: angle between the pusher's velocity and the nearer motion-cone edge, or the
+            outline's tangent, beyond which the fingertip leaves. Of a cone: by how much the velocity midway between
+            the contacts may turn while ω stays [deg].
+        curvature_margin: 1 - turn per travel of the contact / the most among forces of the whole friction cone, a
+            fraction; of a composite cone, the most with the same velocity midway between the contacts.
+        composite_margin: two fingers: the fraction of μ that can be lost before a twist leaves the true composite
+            cone of both contacts, under the believed surface.
+        uniqueness_margin: two fingers on a straight side: how far the turning centres used lie, at least, outside
+            the strip square to the contact that encloses the object [m]. Where it is positive, sticking is the only
+            motion that can happen, whatever the pressure ([Lynch1996] Theorem 4). None without a turn.
+        model_offset: how far the believed surface's line of force passes from the contact, at worst [m]: 0 when the
+            planning model is exact; None where two fingers use their cone.
+        growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.
+        clearance: least distance to obstacles and bounds [m]; None without any.
+        cars: of each push used, by its name.
+        warnings: in words.
+        others: keys of a document that this version does not know; verify cannot recompute them.
+    """
+
+    goal_error: tuple[float, float, float]
+    cost: float
+    duration: float
+    friction_margin: float | None = None
+    friction_margin_degrees: float | None = None
+    spacing_margin: float | None = None
+    motion_cone_margin_degrees: float | None = None
+    curvature_margin: float | None = None
+    composite_margin: float | None = None
+    uniqueness_margin: float | None = None
+    model_offset: float | None = None
+    growth: float | None = None
+    clearance: float | None = None
+    cars: Mapping[str, CarCentres] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    others: Mapping[str, object] = field(default_factory=dict)
