@@ -4,9 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from flatpush.documents import load_scene
-from flatpush.documents.shapes import load_outline, outer_contour
+from flatpush.documents.contours import outer_contour
+from flatpush.documents.drawing import Curve, Drawing
+from flatpush.documents.shapes import load_outline
 from flatpush.errors import InputError, MissingExtra
 
 MM = 1e-3
@@ -90,13 +93,13 @@ def test_holes_are_left_out(tmp_path: Path) -> None:
         ("", "no lines"),
         ('<text x="1" y="1">hello</text>', "no lines"),
         ('<path d="M 0 0 L 10 0 L 10 10"/>', "not closed"),
-        ('<rect width="9" height="9"/><path d="M 1 1 L 2 2"/>', "not closed"),
+        ('<circle cx="4" cy="4" r="2"/><path d="M 0 0 H 9 V 9 H 0 V 1"/>', "not closed"),
         ('<rect width="9" height="9"/><rect x="20" width="9" height="9"/>', "2 outer contours"),
         ('<rect width="9" height="9"/><rect x="4" y="4" width="9" height="4"/>', "2 outer contours"),
         ('<path d="M 0 0 L 10 10 L 10 0 L 0 8 Z"/>', "cross"),
         ('<path d="M 0 0 L 10"/>', "part.svg: "),
         ("<rect", "not a drawing in SVG"),
-        ('<rect width="9" height="9" transform="wobble(3)"/>', "not a drawing in SVG"),
+        ('<rect width="9" height="9" transform="wobble(3)"/>', "<rect> in line 1: its transform"),
     ],
 )
 def test_bad_svg(tmp_path: Path, body: str, words: str) -> None:
@@ -139,9 +142,10 @@ def test_a_scene_finds_its_drawing_beside_it(tmp_path: Path) -> None:
 def test_a_missing_extra_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
-    monkeypatch.setitem(sys.modules, "svgpathtools", None)
+    (tmp_path / "part.dxf").write_text("0\nEOF\n")
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
     with pytest.raises(MissingExtra, match=r'pip install "flatpush\[shapes\]"'):
-        load_outline(svg(tmp_path, TRIANGLE), MM)
+        load_outline(tmp_path / "part.dxf", MM)
 
 
 def dxf(folder: Path, units: int, *draw: tuple[str, tuple[object, ...], dict[str, object]]) -> Path:
@@ -220,8 +224,35 @@ def test_bad_dxf(tmp_path: Path) -> None:
         load_outline(path, MM)
 
 
+def drawing(*lines: ArrayLike) -> Drawing:
+    def curve(k: int, line: ArrayLike) -> Curve:
+        points = np.array(line, dtype=float)
+        return Curve(lambda _: points, f"line {k}")
+
+    return Drawing(curves=[curve(k, line) for k, line in enumerate(lines)])
+
+
 def test_contours_from_lines() -> None:
-    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)], dtype=float)
-    assert outer_contour([square[:3], square[2:]], "").shape == (4, 2)
-    with pytest.raises(InputError, match="no extent"):
-        outer_contour([np.zeros((3, 2))], "")
+    square = [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]
+    contour, outer, left = outer_contour(drawing(square[:3], square[2:], [(0.2, 0.2), (0.4, 0.4)]), "")
+    assert contour.shape == (4, 2)
+    assert outer.place == "line 0 and 1 more"
+    assert [(part.place, part.reason) for part in left] == [("line 2", "an open line")]
+    with pytest.raises(InputError, match="no lines"):
+        outer_contour(drawing(np.zeros((3, 2))), "")
+
+
+def test_a_line_far_away_does_not_blur_the_outline() -> None:
+    """The tolerance of joining is that of the outline, not of the whole drawing: a stroke 1000 km away once made all
+    ends one."""
+    square = [(0, 0), (0.06, 0), (0.06, 0.04), (0, 0.04), (0, 0)]
+    lines = [square[k : k + 2] for k in range(4)]
+    contour, _, left = outer_contour(drawing(*lines, [(1e6, 1e6), (1e6 + 0.01, 1e6)]), "")
+    np.testing.assert_allclose(np.ptp(contour, axis=0), [0.06, 0.04])
+    assert len(left) == 1
+
+
+def test_lines_that_branch_are_refused_where_they_do() -> None:
+    square = [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]
+    with pytest.raises(InputError, match=r"either way at \[[01], [01]\], where 3 lines meet"):
+        outer_contour(drawing(square[:3], square[2:], [(0, 0), (1, 1)]), "")

@@ -15,11 +15,11 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
-    from ..documents import check_writable, load_scene
+    from ..documents import check_writable, load_scene, outline_note
     from ..planning import describe, freedom
     from ..planning.description import turning_radii
 
-    asked = load_scene(scene)
+    asked, note = load_scene(scene), outline_note(scene)
     if figure is not None:
         check_writable(figure)
     with telling("describing"):
@@ -31,6 +31,7 @@ def command(
         describe_figure(asked, sketches(asked, pushes), figure)
     data = {
         "object": asked.object.name,
+        "outline": None if note is None else note.data(),
         "friction": asked.object.friction,
         "centre_of_friction": [float(x) for x in asked.object.cof],
         "second_moments": [[float(x) for x in row] for row in asked.object.support.covariance],
@@ -80,6 +81,8 @@ def _tell(data: dict[str, Any]) -> None:
     mm = 1000.0
     cof, moments = data["centre_of_friction"], data["second_moments"]
     typer.echo(f"{data['object']}: friction between finger and object μ = {data['friction']}")
+    for line in (data["outline"] or {}).get("lines", ()):
+        typer.echo(line)
     typer.echo(f"centre of friction ({mm * cof[0]:.2f}, {mm * cof[1]:.2f}) mm in the frame of the drawing")
     typer.echo(
         f"second moments of the pressure xx {mm * mm * moments[0][0]:.1f}, yy {mm * mm * moments[1][1]:.1f},"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .atomic import check_writable, write_atomically
     from .export import export_csv
+    from .outline_reader import OutlineNote, outline_note, scene_files
     from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import read_mapping
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BadRow",
+    "OutlineNote",
     "PairsFile",
     "RobotLog",
     "RobotRun",
@@ -33,6 +35,7 @@ __all__ = [
     "load_robot_log",
     "load_scene",
     "load_surface",
+    "outline_note",
     "parse_plan",
     "parse_scene",
     "plan_document",
@@ -43,6 +46,7 @@ __all__ = [
     "save_runs",
     "save_surface",
     "scene_document",
+    "scene_files",
     "scene_schema",
     "scene_template",
     "write_atomically",
@@ -50,6 +54,7 @@ __all__ = [
 
 _HOME = {
     "BadRow": "pairs_file",
+    "OutlineNote": "outline_reader",
     "PairsFile": "pairs_file",
     "RobotLog": "robot_log",
     "RobotRun": "robot_log",
@@ -60,6 +65,7 @@ _HOME = {
     "load_robot_log": "robot_log",
     "load_scene": "scene_reader",
     "load_surface": "surface_file",
+    "outline_note": "outline_reader",
     "parse_plan": "plan_file",
     "parse_scene": "scene_reader",
     "plan_document": "plan_file",
@@ -70,6 +76,7 @@ _HOME = {
     "save_runs": "runs_file",
     "save_surface": "surface_file",
     "scene_document": "scene_writer",
+    "scene_files": "outline_reader",
     "scene_schema": "schema",
     "scene_template": "template",
     "write_atomically": "atomic",

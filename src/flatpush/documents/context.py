@@ -73,6 +73,8 @@ class Context:
             if error.source:  # of another file, which this one names
                 where = f"{key}.file"
                 rule = f"{': '.join(part for part in (error.source, error.key) if part)}: {rule}"
+                if error.value is not None:
+                    rule += f" ({error.value})"
             shown = self.value(where)
             raise InputError(
                 rule,

@@ -1,71 +1,224 @@
-"""Reads the lines of a DXF drawing."""
+"""Reads what is visible in the model space of a DXF drawing."""
 
 import os
-from collections.abc import Iterable, Iterator
-from typing import Any
+import re
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .reading import MOST_BYTES
-from .shapes import FLATNESS
+from .drawing import FLATNESS, Curve, Drawing, LeftOut, Unreadable
+from .reading import read_bytes
 
-_LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE")
-# $INSUNITS: metres per unit; 0 and what is not listed say nothing.
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing as Document
+    from ezdxf.entities import DXFEntity
+
+_LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX")
+# What is no line of the object, with the word for it.
+_ASIDE = {
+    **dict.fromkeys(("TEXT", "MTEXT", "ATTRIB", "ATTDEF", "RTEXT", "ARCALIGNEDTEXT"), "text"),
+    **dict.fromkeys(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "TOLERANCE"), "a dimension"),
+    **dict.fromkeys(("LEADER", "MULTILEADER", "MLEADER"), "a leader"),
+    **dict.fromkeys(("HATCH", "MPOLYGON", "SOLID", "TRACE"), "a filled area"),
+    **dict.fromkeys(("POINT",), "a point"),
+    **dict.fromkeys(("XLINE", "RAY"), "an endless construction line"),
+    **dict.fromkeys(("IMAGE", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME", "WIPEOUT"), "a picture"),
+    **dict.fromkeys(("ACAD_TABLE", "TABLE"), "a table"),
+    **dict.fromkeys(("VIEWPORT", "LIGHT", "SUN", "CAMERA", "SECTION", "GEODATA", "SEQEND"), "no line"),
+}  # fmt: skip
+# $INSUNITS: metres per unit; 0 says nothing.
 _UNITS = {
-    1: 0.0254,
-    2: 0.3048,
-    4: 1e-3,
-    5: 1e-2,
-    6: 1.0,
-    8: 0.0254e-6,
-    9: 0.0254e-3,
-    10: 0.9144,
-    13: 1e-6,
-    14: 0.1,
-}
-_MOST_NESTED = 8
+    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 0.0254e-6, 9: 0.0254e-3, 10: 0.9144,
+    11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 17: 1e9,
+    21: 1200 / 3937, 22: 100 / 3937, 23: 3600 / 3937, 24: 1200 / 3937 * 5280,
+}  # fmt: skip
+# Names of line types and layers of lines that are no edges.
+_LINE_TYPES = {
+    "a centre line": ("center", "centre", "dashdot", "dash_dot", "chain", "acad_iso04", "acad_iso08", "acad_iso10"),
+    "a phantom line": ("phantom", "divide", "border", "acad_iso05", "acad_iso09", "acad_iso12"),
+    "a hidden line": ("hidden", "dashed", "dot", "acad_iso02", "acad_iso03", "acad_iso07"),
+}  # fmt: skip
+_MOST_NESTED, _MOST_ENTITIES = 8, 200_000
+_DECLARED = re.compile(rb"\$INSUNITS\s*\r?\n\s*70\s*\r?\n\s*(-?[0-9]+)")
 
 
-def dxf_lines(path: str | os.PathLike[str]) -> tuple[list[Array], float | None]:
-    """The contours of the model space, each of shape (n, 2), and the length of its unit [m], None if not
-    declared.
+def read_dxf(path: str | os.PathLike[str]) -> Drawing:
+    """The visible curves of the model space, each with its layer.
 
-    Read are lines, arcs, circles, ellipses, polylines (with bulges) and splines, also inside inserted blocks.
+    Read are lines, arcs, circles, ellipses, polylines (with bulges), multilines and splines, also inside
+    inserted blocks and arrays of them. The unit is that of $INSUNITS, None if the file does not set it.
+
+    Raises:
+        InputError: if the file is not such a drawing, or its unit is not known.
+        ImportError: if ezdxf is not installed.
     """
     import ezdxf
-    from ezdxf import path as paths
 
     source = os.fspath(path)
     hint = "Is it the right file, and is it complete?"
+    content = read_bytes(path)
     try:
-        if os.path.getsize(path) > MOST_BYTES:
-            raise InputError("a drawing has at most 10 MB", source=source, hint=hint)
-        drawing = ezdxf.readfile(source)
-        contours = [paths.make_path(entity) for entity in _entities(drawing.modelspace(), 0)]
-    except OSError as error:
+        document = ezdxf.readfile(source)
+        unit = _unit(document, content, source)
+        reader = _Reader(document)
+        reader.visit(document.modelspace(), "0", (), 0)
+        if not reader.drawing.curves:
+            reader.look_at_paper()
+    except OSError:
         # ezdxf raises a plain OSError for a file that is no DXF file.
-        reason = (error.strerror or "it is not a drawing in DXF").lower()
-        raise InputError(f"the drawing cannot be read ({reason})", source=source, hint=hint) from None
-    except InputError:
-        raise
+        raise InputError("the drawing cannot be read (it is not in DXF)", source=source, hint=hint) from None
+    except InputError as error:
+        raise InputError(error.rule, source=source, value=error.value, hint=error.hint or hint) from None
     except Exception as error:  # a broken file can make it stumble anywhere
         raise InputError(f"this is not a drawing in DXF ({error})", source=source, hint=hint) from error
-    contours = [contour for contour in contours if len(contour)]
-    if not contours:
-        return [], None
-    box = paths.bbox(contours)
-    tolerance = FLATNESS * max(box.size.x, box.size.y)
-    if not tolerance > 0:
-        return [], None
-    lines = [np.array([(p.x, p.y) for p in contour.flattening(tolerance)]) for contour in contours]
-    return lines, _UNITS.get(drawing.header.get("$INSUNITS", 0))
+    reader.drawing.unit = unit
+    return reader.drawing
 
 
-def _entities(container: Iterable[Any], level: int) -> Iterator[Any]:
-    for entity in container:
-        if entity.dxftype() in _LINES:
-            yield entity
-        elif entity.dxftype() == "INSERT" and level < _MOST_NESTED:
-            yield from _entities(entity.virtual_entities(), level + 1)
+def _unit(document: "Document", content: bytes, source: str) -> float | None:
+    if b"$INSUNITS" not in content:
+        return None  # ezdxf then says metres
+    match = _DECLARED.search(content)
+    code = int(match[1]) if match else int(document.header.get("$INSUNITS", 0))
+    if code and code not in _UNITS:
+        raise InputError(
+            "the unit of the drawing is not known ($INSUNITS)",
+            source=source,
+            value=code,
+            hint="Set it to 4 (mm), or to 0 for the unit of the scene.",
+        )
+    return _UNITS.get(code)
+
+
+class _Reader:
+    def __init__(self, document: "Document") -> None:
+        self.document = document
+        self.drawing = Drawing()
+        self.count = 0
+        self.layers = {layer.dxf.name.casefold(): layer for layer in document.layers}
+        self.drawing.known.update(dict.fromkeys(layer.dxf.name for layer in document.layers))
+
+    def visit(
+        self, entities: Iterable["DXFEntity"], around: str, blocks: tuple[str, ...], level: int
+    ) -> None:
+        """Reads entities; around: the layer of the insert that they are in; blocks: the blocks they are in."""
+        for entity in entities:
+            self.count += 1
+            if self.count > _MOST_ENTITIES:
+                raise InputError(f"the drawing has at most {_MOST_ENTITIES} entities")
+            self.entity(entity, around, blocks, level)
+
+    def entity(self, entity: "DXFEntity", around: str, blocks: tuple[str, ...], level: int) -> None:
+        kind = entity.dxftype()
+        layer = entity.dxf.get("layer", "0")
+        if layer == "0" and blocks:
+            layer = around
+        handle = entity.dxf.handle or getattr(entity.source_of_copy, "dxf", entity.dxf).handle
+        place = f"{kind} on layer {layer!r}"
+        place += f" in block {blocks[-1]!r}" if blocks else f" (handle {handle})"
+        names = (layer, *blocks)
+        if reason := self.unseen(entity, layer, frozen_only=kind == "INSERT"):
+            self.drawing.left_out.append(LeftOut(place, reason))
+        elif kind == "INSERT":
+            self.insert(entity, layer, blocks, level, place)
+        elif kind == "MLINE":
+            self.visit(entity.virtual_entities(), layer, blocks, level)
+        elif kind in _ASIDE:
+            self.drawing.left_out.append(LeftOut(place, _ASIDE[kind]))
+        elif kind not in _LINES or (
+            kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh)
+        ):
+            self.drawing.unreadable.append(Unreadable(place, "this kind of entity is not read", names))
+        else:
+            points = _points(entity)
+            if points is not None:
+                aside = self.aside(entity, layer)
+                self.drawing.curves.append(Curve(points, place, layer, names, aside))
+
+    def unseen(self, entity: "DXFEntity", layer: str, frozen_only: bool) -> str:
+        """Why an entity is not visible. An insert on a layer that is off shows what its block has on others."""
+        if entity.dxf.get("invisible", 0):
+            return "invisible"
+        if layer.casefold() == "defpoints":
+            return "on Defpoints, which is never plotted"
+        state = self.layers.get(layer.casefold())
+        if state is not None and state.is_frozen():
+            return f"layer {layer!r} is frozen"
+        if state is not None and state.is_off() and not frozen_only:
+            return f"layer {layer!r} is off"
+        return ""
+
+    def insert(
+        self, insert: "DXFEntity", layer: str, blocks: tuple[str, ...], level: int, place: str
+    ) -> None:
+        name = insert.dxf.name
+        block = self.document.blocks.get(name)
+        if block is None or (block.block is not None and block.block.dxf.get("flags", 0) & 0b1100):
+            where = "is not in the file" if block is None else "is in another file"
+            self.drawing.unreadable.append(
+                Unreadable(place, f"its block {name!r} {where}", (layer, *blocks, name))
+            )
+            return
+        if level >= _MOST_NESTED:
+            raise InputError(f"blocks are nested at most {_MOST_NESTED} levels deep", value=name)
+        skipped: list[str] = []
+        for one in insert.multi_insert() if insert.mcount > 1 else [insert]:
+            parts = one.virtual_entities(skipped_entity_callback=lambda e, _: skipped.append(e.dxftype()))
+            self.visit(parts, layer, (*blocks, name), level + 1)
+        for kind in dict.fromkeys(skipped):
+            if kind in _ASIDE:
+                self.drawing.left_out.append(LeftOut(f"{kind} in block {name!r}", _ASIDE[kind]))
+            else:
+                self.drawing.unreadable.append(
+                    Unreadable(
+                        f"{kind} in block {name!r}",
+                        "it cannot be placed as the insert asks",
+                        (layer, *blocks, name),
+                    )
+                )
+
+    def aside(self, entity: "DXFEntity", layer: str) -> str:
+        """Why a line is no edge, by the type of the line."""
+        name = entity.dxf.get("linetype", "BYLAYER")
+        if name.upper() in ("BYLAYER", "BYBLOCK"):
+            state = self.layers.get(layer.casefold())
+            name = state.dxf.get("linetype", "CONTINUOUS") if state is not None else "CONTINUOUS"
+        for kind, words in _LINE_TYPES.items():
+            if name.casefold().startswith(words):
+                return f"{kind} (line type {name})"
+        return ""
+
+    def look_at_paper(self) -> None:
+        """Tells that the lines are on paper, where the model space has none."""
+        for layout in self.document.layouts:
+            if not layout.is_modelspace and any(e.dxftype() in _LINES for e in layout):
+                self.drawing.left_out.append(
+                    LeftOut(
+                        f"what is on the sheet {layout.name!r}", "in paper space; only model space is read"
+                    )
+                )
+
+
+def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
+    """What gives the polygon of an entity; None for one without length."""
+    from ezdxf import path as paths
+
+    if entity.dxftype() == "POLYLINE" and not len(entity.vertices):
+        return None
+    path = paths.make_path(entity)
+    if not len(path):
+        return None
+    if not path.has_curves:
+        corners = np.array([(p.x, p.y) for p in path.control_vertices()])
+        return lambda tolerance: corners
+    box = paths.bbox([path], fast=True)
+    size = max(box.size.x, box.size.y)
+
+    def points(tolerance: float) -> Array:
+        distance = tolerance if np.isfinite(tolerance) else 0.1 * size
+        return np.array([(p.x, p.y) for p in path.flattening(max(distance, FLATNESS**2 * size), segments=4)])
+
+    return points

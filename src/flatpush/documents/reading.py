@@ -58,6 +58,22 @@ def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[s
 
 def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     """The text (UTF-8) of a file of at most so many bytes."""
+    content = read_bytes(path, most)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise InputError(
+            "the file is not text in UTF-8",
+            source=os.fspath(path),
+            hint="It looks binary: is it the right file?",
+        )
+    return text
+
+
+def read_bytes(path: str | os.PathLike[str], most: int = MOST_BYTES) -> bytes:
+    """The content of a file of at most so many bytes."""
     source = os.fspath(path)
     try:
         with open(path, "rb") as file:
@@ -77,15 +93,7 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
             source=source,
             hint="Is it the right file?",
         )
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
-        raise InputError(
-            "the file is not text in UTF-8", source=source, hint="It looks binary: is it the right file?"
-        )
-    return text
+    return content
 
 
 def plain(value: Any, source: str = "", key: str = "", level: int = 0) -> Any:

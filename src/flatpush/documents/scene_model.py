@@ -117,7 +117,19 @@ class RoundObstaclePart(Part):
 class ShapeFilePart(Part):
     """A drawing, by its path relative to this file."""
 
-    file: Text = Field(description="The path of an SVG or DXF file, relative to this one.")
+    file: Text = Field(description="The path of an SVG or DXF file or a bitmap, relative to this one.")
+    layer: Text | None = Field(
+        default=None, description="The layer, id or label of the outline; all that is visible if left out."
+    )
+    origin: Annotated[
+        Annotated[Literal["centroid", "drawing"], Tag("<word>")] | Annotated[Point, Tag("<point>")],
+        *forms("an origin", (), word=True, listed="point"),
+    ] = Field(
+        default="drawing",
+        description="Where the object's frame begins: centroid, drawing, or a point [x, y] of the drawing, y up.",
+    )
+    turn: Number = Field(default=0.0, description="By what angle the drawing is turned, counter-clockwise.")
+    pixel: Positive | None = Field(default=None, description="The side of a pixel; of bitmaps only.")
 
 
 class FeetPart(Part):
@@ -180,7 +192,12 @@ OutlineForm = Annotated[
     Annotated[list[Point], Tag("<corners>")]
     | Annotated[CirclePart, Tag("<circle>")]
     | Annotated[ShapeFilePart, Tag("<file>")],
-    *forms("an outline", (("circle",), ("file",)), listed="corners"),
+    *forms(
+        "an outline",
+        (("circle",), ("file",)),
+        listed="corners",
+        others=("centre", "layer", "origin", "turn", "pixel"),
+    ),
 ]
 ObstacleForm = Annotated[
     Annotated[list[Point], Tag("<corners>")] | Annotated[RoundObstaclePart, Tag("<circle>")],
@@ -213,7 +230,8 @@ class ObjectPart(Part):
 
     name: Text = Field(default="object", description="Any text; numbers and the like in quotes.")
     outline: OutlineForm = Field(
-        description="A list of [x, y] corners, {circle: r}, {file: part.svg} or {file: part.dxf}."
+        description="A list of [x, y] corners, {circle: r}, {file: part.svg}, {file: part.dxf} or "
+        "{file: mask.png, pixel: 0.4}."
     )
     support: SupportForm = Field(
         default="uniform",

@@ -10,8 +10,10 @@ from ..errors import InputError
 from ..geometry import Outline
 from ..geometry.pose import Array
 from ..problem import Object, Planning, Pusher, Scene, Workspace
+from ..problem.frame import moved_inside
 from . import scene_model as m
 from .context import PER_METRE, Context
+from .outline_reader import pixels, read_drawing
 from .push_reader import open_polygon, read_pushes
 from .reading import join, plain, read_mapping
 from .refusals import checked, nearest
@@ -94,7 +96,7 @@ def _scene(ctx: Context, model: m.SceneModel) -> Scene:
     pusher = _pusher(ctx, model.pusher)
     workspace = _workspace(ctx, model.workspace, obj)
     pushes = model.pushes
-    return Scene(
+    scene = Scene(
         object=obj,
         start=_pose(ctx, model.start, "start"),
         goal=_pose(ctx, model.goal, "goal"),
@@ -103,6 +105,7 @@ def _scene(ctx: Context, model: m.SceneModel) -> Scene:
         workspace=workspace,
         planning=_planning(ctx, model.planning),
     )
+    return moved_inside(scene)
 
 
 def _object(ctx: Context, part: m.ObjectPart) -> Object:
@@ -124,10 +127,11 @@ def _outline(ctx: Context, form: Any) -> Outline:
     if isinstance(form, m.CirclePart):
         return Outline.circle(form.circle / ctx.per_metre, ctx.lengths(form.centre))
     if isinstance(form, m.ShapeFilePart):
-        from .shapes import load_outline
-
-        return load_outline(ctx.folder / form.file, 1 / ctx.per_metre)
-    return Outline.polygon(open_polygon(ctx.lengths(form)))
+        return read_drawing(ctx, form).outline
+    corners = open_polygon(ctx.lengths(form))
+    return (
+        Outline.polygon(corners) if (smooth := pixels(ctx, corners)) is None else Outline.polygon(smooth[0])
+    )
 
 
 def _pusher(ctx: Context, part: m.PusherPart) -> Pusher:

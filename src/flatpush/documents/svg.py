@@ -1,89 +1,690 @@
-"""Reads the lines of an SVG drawing."""
+"""Reads what is visible in an SVG drawing."""
 
 import os
 import re
-import warnings
-from io import StringIO
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from xml.parsers import expat
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .reading import read_text
-from .shapes import FLATNESS, flattened
+from .drawing import FLATNESS, Curve, Drawing, LeftOut, Unreadable, extent
+from .reading import read_bytes
+from .svg_path import EllipticArc, Segment, Straight, subpaths, traced
+from .svg_style import GEOMETRY, Element, Rule, Unsupported, sheet_rules, style_of
 
-# Metres per unit. px is no real length here: programs disagree about it.
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6}
-_LENGTH = re.compile(r"\s*([0-9.eE+-]+)\s*(mm|cm|in|pt|pc)\s*")
+# Metres per unit of a page. px is no real length here: programs disagree about it.
+_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "q": 0.25e-3}
+_PX = 0.0254 / 96  # where a drawing mixes real lengths with its own units, these are CSS pixels
+_OLD_PX = 0.0254 / 90  # of Inkscape before 0.92
+_LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([a-zA-Z%]*)\s*")
+_NUMBERS = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_FUNCTION = re.compile(r"[\s,]*([A-Za-z0-9]+)\s*\(([^()]*)\)")
+_URL = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
+_SPACES = {
+    "http://www.w3.org/2000/svg": "",
+    "http://www.w3.org/1999/xlink": "xlink:",
+    "http://www.inkscape.org/namespaces/inkscape": "inkscape:",
+    "http://www.w3.org/XML/1998/namespace": "xml:",
+}
+_CONTAINERS = ("g", "a", "svg", "switch")
+_SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
+# What is visible and is no line of the object, with the word for it.
+_ASIDE = {"text": "text", "flowRoot": "text", "image": "a picture"}
+_MOST_NESTED, _MOST_ELEMENTS = 60, 200_000
+_WHITE = ("white", "#fff", "#ffffff", "rgb(255,255,255)")
+_NO_TURN = np.hstack([np.eye(2), np.zeros((2, 1))])
 
 
-def svg_lines(path: str | os.PathLike[str]) -> tuple[list[Array], float | None]:
-    """The contours of a drawing, each of shape (n, 2), y up, and the length of its unit [m].
+def read_svg(path: str | os.PathLike[str]) -> Drawing:
+    """The visible curves of a drawing, y up, each with its layers and ids.
 
-    Transforms are applied, and the basic shapes are read as paths. The unit is known if the drawing gives its
-    width and height in mm, cm, in, pt or pc together with a viewBox; otherwise it is None.
+    Styles, transforms, nested and reused parts are honoured as a browser does. The unit is known if the drawing
+    gives its width and height, or the lengths of its shapes, in mm, cm, in, pt or pc; otherwise it is None.
+
+    Raises:
+        InputError: if the file is not a drawing in SVG, or is stretched.
     """
-    from svgpathtools import Document
-
     source = os.fspath(path)
-    text = read_text(path)
-    if "<!ENTITY" in text:
-        raise InputError("entities in drawings are not read", source=source, hint="Save it as plain SVG.")
+    hint = "Is it the right file, and is it complete?"
     try:
-        with warnings.catch_warnings():
-            # It only warns of a transform that it cannot read.
-            warnings.simplefilter("error", UserWarning)
-            document = Document(StringIO(text))
-            paths = [part for whole in document.paths() for part in whole.continuous_subpaths() if len(part)]
-        scale = _scale(document.root.attrib)
+        root, linked = _parsed(read_bytes(path))
+    except expat.ExpatError as error:
+        reason = f"line {error.lineno}: {expat.errors.messages[error.code]}"
+        raise InputError(f"this is not a drawing in SVG ({reason})", source=source, hint=hint) from None
+    except (ValueError, LookupError) as error:
+        if isinstance(error, InputError):
+            raise InputError(error.rule, source=source, hint=error.hint or "Save it as plain SVG.") from None
+        raise InputError(f"this is not a drawing in SVG ({error})", source=source, hint=hint) from None
+    if root is None or root.tag != "svg":
+        raise InputError("this is not a drawing in SVG (it has no <svg>)", source=source, hint=hint)
+    if linked:
+        raise InputError(
+            "the drawing takes its style from another file", source=source, value=linked, hint=_PLAIN
+        )
+    try:
+        return _Reader(root).read()
     except InputError as error:
-        raise InputError(error.rule, source=source, value=error.value, hint=error.hint) from None
-    except Exception as error:  # a broken file can make it stumble anywhere
-        hint = "Is it the right file, and is it complete?"
-        raise InputError(f"this is not a drawing in SVG ({error})", source=source, hint=hint) from error
-    corners = np.array(
-        [(p.real, p.imag) for part in paths for segment in part for p in (segment.start, segment.end)]
-    )
-    if not len(corners):
-        return [], scale
-    size = float(np.max(np.ptp(corners, axis=0))) or float(max(part.length() for part in paths))
-    return [_flattened(part, FLATNESS * size) * (1.0, -1.0) for part in paths], scale
+        raise InputError(
+            error.rule, source=source, value=error.value, hint=error.hint or "Save it as plain SVG."
+        ) from None
 
 
-def _flattened(part: Any, tolerance: float) -> Array:
-    from svgpathtools import Line
+_PLAIN = "Save it as plain SVG, with its style in attributes."
 
-    pieces = [np.array([[part[0].start.real, part[0].start.imag]])]
-    for segment in part:
-        if isinstance(segment, Line):
-            points = np.array([[segment.end.real, segment.end.imag]])
+
+def _parsed(content: bytes) -> tuple[Element | None, str]:
+    """The root element, in whatever encoding the file declares, and a style sheet that it links."""
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
+    stack: list[Element] = []
+    roots: list[Element] = []
+    linked: list[str] = []
+
+    def short(name: str) -> str:
+        space, _, local = name.rpartition(" ")
+        return local if not space else _SPACES.get(space, "other:") + local
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if len(stack) >= 500:
+            raise InputError("the drawing has at most 500 levels")
+        parent = stack[-1] if stack else None
+        named = {short(key): value for key, value in attributes.items()}
+        element = Element(short(name), named, parser.CurrentLineNumber, parent)
+        (parent.children if parent else roots).append(element)
+        stack.append(element)
+
+    def text(data: str) -> None:
+        if stack and stack[-1].tag == "style":
+            stack[-1].text += data
+
+    def entity(*_: object) -> None:
+        raise InputError("entities in drawings are not read")
+
+    def instruction(target: str, data: str) -> None:
+        if target == "xml-stylesheet":
+            linked.append(data)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _: stack.pop()
+    parser.CharacterDataHandler = text
+    parser.EntityDeclHandler = entity
+    parser.ProcessingInstructionHandler = instruction
+    parser.Parse(content, True)
+    return (roots[0] if roots else None), "; ".join(linked)
+
+
+@dataclass(frozen=True)
+class _State:
+    """What a parent hands to its children.
+
+    Attributes:
+        matrix: to the drawing's own units, y down, shape (2, 3).
+        style: values of properties; opacity: whether anything can be seen.
+        viewport: width and height that percentages refer to, NaN where unknown.
+        names: by which the parts can be chosen; layer: the innermost layer of Inkscape.
+        refusal: why what is drawn here is not what is seen.
+        window: corners outside of which nothing is seen (4, 2), with the place of what cuts it off.
+        used: the elements that are being reused, against endless recursion.
+    """
+
+    matrix: Array
+    style: Mapping[str, str]
+    viewport: tuple[float, float]
+    hidden: str = ""
+    names: tuple[str, ...] = ()
+    layer: str = ""
+    refusal: str = ""
+    window: tuple[Array, str] | None = None
+    used: tuple[int, ...] = ()
+
+
+class _Reader:
+    def __init__(self, root: Element) -> None:
+        self.root = root
+        self.drawing = Drawing()
+        self.ids: dict[str, Element] = {}
+        self.rules: list[Rule] = []
+        self.count = 0
+        self.real: str = ""  # places of shapes with lengths in real units, and of those without
+        self.bare: str = ""
+
+    def read(self) -> Drawing:
+        waiting = [self.root]
+        while waiting:
+            element = waiting.pop()
+            if "id" in element.attributes:
+                self.ids.setdefault(element.attributes["id"], element)
+            waiting += reversed(element.children)
+            if element.tag == "style" and element.attributes.get("media", "all") in ("all", "screen", ""):
+                try:
+                    self.rules += sheet_rules(element.text, len(self.rules))
+                except Unsupported as reason:
+                    raise InputError(f"{element.place}: {reason}", hint=_PLAIN) from None
+        self.drawing.unit = _page_unit(self.root)
+        box = _box(self.root)
+        sides = [_number(self.root.attributes.get(key, "")) for key in ("width", "height")]
+        viewport = (box[2], box[3]) if box is not None else (sides[0], sides[1])
+        self.visit(self.root, _State(_NO_TURN, {}, viewport), page=True)
+        if self.real and self.drawing.unit is None:
+            if self.bare:
+                raise InputError(
+                    f"{self.real} has lengths in real units, {self.bare} has none, and the page has no real size",
+                    hint="Give the page width and height in mm and a viewBox.",
+                )
+            self.drawing.unit = _PX
+        return self.drawing
+
+    def visit(self, element: Element, state: _State, page: bool = False) -> None:
+        self.count += 1
+        if self.count > _MOST_ELEMENTS or len(state.used) > _MOST_NESTED:
+            raise InputError(
+                f"the drawing has at most {_MOST_ELEMENTS} parts, {_MOST_NESTED} levels of reuse"
+            )
+        tag = element.tag
+        if tag not in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use", "foreignObject"):
+            return  # definitions, metadata and what other programs put there
+        try:
+            style = style_of(element, self.rules, state.style)
+            state = self.inside(element, state, style, page)
+        except (Unsupported, ValueError) as reason:
+            self.unreadable(element, state, str(reason))
+            return
+        if state.hidden:
+            self.left_out(element, state.hidden)
+            return
+        try:
+            if tag in _SHAPES:
+                self.shape(element, state)
+            elif tag in _ASIDE:
+                self.left_out(element, _ASIDE[tag])
+            elif tag == "foreignObject":
+                self.unreadable(element, state, "what it shows is not SVG")
+            elif tag == "use":
+                self.use(element, state)
+            elif tag == "switch":
+                self.switch(element, state)
+            else:
+                if tag == "svg" and not page:
+                    state = self.viewport(element, state, element.attributes)
+                for child in element.children:
+                    self.visit(child, state)
+        except ValueError as reason:
+            if isinstance(reason, InputError):
+                raise
+            self.unreadable(element, state, str(reason))
+
+    def inside(self, element: Element, state: _State, style: Mapping[str, str], page: bool) -> _State:
+        """The state for what is drawn by an element and its children."""
+        names = [element.attributes.get(key, "") for key in ("id", "inkscape:label")]
+        layer = state.layer
+        if element.attributes.get("inkscape:groupmode") == "layer":
+            layer = names[1] or names[0]
+        own = tuple(name for name in names if name and not page)
+        self.drawing.known.update(dict.fromkeys(own))
+        hidden = state.hidden
+        if style.get("display", "").lower() == "none":
+            hidden = "hidden (display: none)"
+        elif "opacity" in style and _portion(style["opacity"]) <= 0:
+            hidden = "hidden (opacity: 0)"
+        refusal = state.refusal
+        clip, mask = style.get("clip-path", ""), style.get("mask", "")
+        if mask.lower() not in ("", "none"):
+            refusal = f"it is masked ({mask})"
+        matrix = state.matrix
+        if not page:
+            matrix = _joined(matrix, _transform(element, style))
+        result = replace(
+            state, matrix=matrix, style=style, hidden=hidden, names=(*state.names, *own),
+            layer=layer, refusal=refusal,
+        )  # fmt: skip
+        if clip.lower() not in ("", "none") and not hidden:
+            window = self.clip(clip, result)
+            if window is None or state.window is not None:
+                return replace(result, refusal=f"it is clipped ({clip})")
+            return replace(result, window=(window, f"clip-path {clip}"))
+        return result
+
+    def clip(self, clip: str, state: _State) -> Array | None:
+        """The corners of a plain clipping path in the drawing's units; None where it is not plain."""
+        match = _URL.fullmatch(clip.strip())
+        element = self.ids.get(match[1].lstrip("#")) if match else None
+        if element is None or element.tag != "clipPath" or len(element.children) != 1:
+            return None
+        if element.attributes.get("clipPathUnits", "userSpaceOnUse") != "userSpaceOnUse":
+            return None
+        (child,) = element.children
+        if child.tag not in _SHAPES or any(
+            k in e.attributes for k in ("clip-path",) for e in (element, child)
+        ):
+            return None
+        matrix = _joined(state.matrix, _transform(element, style_of(element, self.rules, {})))
+        style = style_of(child, self.rules, {})
+        matrix = _joined(matrix, _transform(child, style))
+        parts = self.segments(child, replace(state, matrix=matrix, style=style))
+        if len(parts) != 1:
+            return None
+        points = traced([s.moved(matrix) for s in parts[0]])(np.inf)
+        return traced([s.moved(matrix) for s in parts[0]])(FLATNESS * extent(points))
+
+    def use(self, element: Element, state: _State) -> None:
+        href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
+        target = self.ids.get(href[1:]) if href.startswith("#") else None
+        if target is None:
+            where = "is in another file" if href and not href.startswith("#") else "is not in the drawing"
+            self.unreadable(element, state, f"what it shows ({href!r}) {where}")
+            return
+        if id(target) in state.used:
+            self.unreadable(element, state, "it shows itself")
+            return
+        x, y = (self.length(element, key, state, axis) for axis, key in enumerate(("x", "y")))
+        matrix = _joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        state = replace(state, matrix=matrix, used=(*state.used, id(target)))
+        if target.tag not in ("symbol", "svg"):
+            self.visit(target, state)
+            return
+        sides = {k: v for k, v in element.attributes.items() if k in ("width", "height")}
+        inner = {**target.attributes, **sides}
+        style = style_of(target, self.rules, state.style)
+        state = self.inside(target, state, style, False)
+        if state.hidden:
+            self.left_out(target, state.hidden)
+            return
+        state = self.viewport(target, state, inner)
+        for child in target.children:
+            self.visit(child, state)
+
+    def switch(self, element: Element, state: _State) -> None:
+        """Draws the first part whose conditions hold."""
+        for child in element.children:
+            if child.tag not in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use", "foreignObject"):
+                continue
+            if child.attributes.get("systemLanguage", "").strip():
+                self.unreadable(child, state, "whether it is shown depends on the language of the reader")
+                return
+            needs = child.attributes.get("requiredExtensions")
+            if needs is not None or child.tag == "foreignObject":
+                continue
+            self.visit(child, state)
+            return
+
+    def viewport(self, element: Element, state: _State, given: Mapping[str, str]) -> _State:
+        """The state inside a nested drawing or a symbol."""
+        whole = {"width": "100%", "height": "100%"}
+        asked = Element(element.tag, {**whole, **given}, element.line)
+        x, y = (0.0, 0.0)
+        if element.tag == "svg":
+            x, y = (self.length(asked, key, state, axis) for axis, key in enumerate(("x", "y")))
+        box = _box(asked)
+        try:
+            width, height = (
+                self.length(asked, key, state, axis) for axis, key in enumerate(("width", "height"))
+            )
+        except ValueError:
+            if box is not None:
+                raise
+            width = height = np.nan
+        matrix = _joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        window = state.window
+        refusal = state.refusal
+        if state.style.get("overflow", "hidden") not in ("visible", "auto") and np.isfinite(width + height):
+            corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], dtype=float)
+            if window is not None:
+                refusal = refusal or f"it is cut off by {element.place} and by {window[1]}"
+            window = (corners @ matrix[:, :2].T + matrix[:, 2], f"the edge of {element.place}")
+        inner = (width, height)
+        if box is not None:
+            matrix = _joined(matrix, _fitted(box, width, height, given.get("preserveAspectRatio", "")))
+            inner = (box[2], box[3])
+        return replace(state, matrix=matrix, viewport=inner, window=window, refusal=refusal)
+
+    def shape(self, element: Element, state: _State) -> None:
+        style = state.style
+        if style.get("visibility", "").lower() in ("hidden", "collapse"):
+            self.left_out(element, f"hidden (visibility: {style['visibility']})")
+            return
+        filled = _painted(style, "fill", "black")
+        stroked = _painted(style, "stroke", "none") and _width(style.get("stroke-width", "1")) > 0
+        if not (filled and element.tag != "line") and not stroked:
+            self.left_out(element, "not visible (no fill and no stroke)")
+            return
+        aside, refusal = "", state.refusal
+        place = element.place + (f" on layer {state.layer!r}" if state.layer else "")
+        if filled and not stroked and self.is_paper(element, state):
+            aside = "a white rectangle as large as the page"
+        marker = next((style[k] for k in ("marker-start", "marker-mid", "marker-end") if k in style), "none")
+        if (
+            stroked
+            and marker.lower() not in ("", "none")
+            and element.tag in ("path", "line", "polyline", "polygon")
+        ):
+            refusal = refusal or f"it has markers ({marker})"
+        for segments in self.segments(element, state):
+            moved: list[Segment] = [s.moved(_upright(state.matrix)) for s in segments]
+            points = traced(moved)
+            cut = refusal
+            if state.window is not None and not cut and not _within(points, state.window[0] * (1.0, -1.0)):
+                cut = f"it is cut off by {state.window[1]}"
+            self.drawing.curves.append(Curve(points, place, state.layer, state.names, aside, cut))
+
+    def is_paper(self, element: Element, state: _State) -> bool:
+        """Whether a shape is a white rectangle that covers the page."""
+        box = _box(self.root)
+        if element.tag != "rect" or state.style.get("fill", "").replace(" ", "").lower() not in _WHITE:
+            return False
+        if box is None:
+            box = np.array([0.0, 0.0, *state.viewport])
+        points = np.concatenate(
+            [s.moved(state.matrix).points(np.inf) for s in self.segments(element, state)[0]]
+        )
+        low, high = points.min(axis=0), points.max(axis=0)
+        slack = 1e-3 * max(box[2], box[3])
+        return bool(np.all(low <= box[:2] + slack) and np.all(high >= box[:2] + box[2:] - slack))
+
+    def segments(self, element: Element, state: _State) -> list[list[Segment]]:
+        """The subpaths of a basic shape or a path, in its own frame."""
+        tag = element.tag
+        if tag == "path":
+            self.note(element, bare=True)
+            data = state.style.get("d", element.attributes.get("d", ""))
+            if match := re.fullmatch(r"path\(\s*['\"](.*)['\"]\s*\)", data, re.S):
+                data = match[1]
+            return subpaths("" if data.strip().lower() == "none" else data)
+        if tag in ("polyline", "polygon"):
+            text = element.attributes.get("points", "")
+            if _NUMBERS.sub("", text).strip(" \t\r\n\f,"):
+                raise ValueError(f"its points are no numbers ({text[:40]!r})")
+            numbers = [float(x) for x in _NUMBERS.findall(text)]
+            if len(numbers) % 2 or not np.all(np.isfinite(numbers)):
+                raise ValueError("its points are not pairs of finite numbers")
+            self.note(element, bare=True)
+            corners = np.array(numbers).reshape(-1, 2)
+            if tag == "polygon" and len(corners):
+                corners = np.concatenate([corners, corners[:1]])
+            return [[Straight(corners)]] if len(corners) > 1 else []
+        if tag == "line":
+            x1, y1, x2, y2 = (
+                self.length(element, k, state, n % 2) for n, k in enumerate(("x1", "y1", "x2", "y2"))
+            )
+            return [[Straight(np.array([(x1, y1), (x2, y2)]))]]
+        if tag == "rect":
+            x, y, w, h = (
+                self.length(element, k, state, n % 2) for n, k in enumerate(("x", "y", "width", "height"))
+            )
+            rx, ry = (self.radius(element, k, state, n) for n, k in enumerate(("rx", "ry")))
+            if w < 0 or h < 0:
+                raise ValueError("its width and height are not negative")
+            return _rectangle(x, y, w, h, rx, ry) if w and h else []
+        cx, cy = (self.length(element, k, state, n) for n, k in enumerate(("cx", "cy")))
+        if tag == "circle":
+            rx = ry = self.length(element, "r", state, 2)
         else:
-            points = flattened(lambda t, s=segment: _points(s, t), tolerance)[1:]  # type: ignore[misc]
-        pieces.append(points)
-    return np.concatenate(pieces)
+            given = [self.radius(element, k, state, n) for n, k in enumerate(("rx", "ry"))]
+            rx = given[0] if given[0] is not None else given[1] or 0.0
+            ry = given[1] if given[1] is not None else rx
+        if rx < 0 or ry < 0:
+            raise ValueError("its radius is not negative")
+        if not (rx and ry):
+            return []
+        return [[EllipticArc(np.array([cx, cy]), np.diag([rx, ry]), 0.0, 2 * np.pi)]]
+
+    def radius(self, element: Element, key: str, state: _State, axis: int) -> float | None:
+        """A radius that may be left out or auto; None then, and for a negative one, as browsers read it."""
+        text = state.style.get(key, element.attributes.get(key, "auto"))
+        if text.strip().lower() in ("", "auto"):
+            return None
+        value = self.length(element, key, state, axis)
+        return value if value >= 0 else None
+
+    def length(self, element: Element, key: str, state: _State, axis: int) -> float:
+        """A length in the units of the drawing; 0 if left out. axis: 0 across, 1 down, 2 of both for radii."""
+        text = state.style.get(key, "") if key in GEOMETRY and element.tag in _SHAPES else ""
+        text = text or element.attributes.get(key, "0")
+        match = _LENGTH.fullmatch(text)
+        if match is None:
+            if text.strip().lower() == "auto" and key in ("width", "height"):
+                return self.length(Element(element.tag, {key: "100%"}, element.line), key, state, axis)
+            raise ValueError(f"its {key} is no length ({text!r})")
+        value, unit = float(match[1]), match[2].lower()
+        if not np.isfinite(value):
+            raise ValueError(f"its {key} is not finite ({text!r})")
+        if unit == "%":
+            w, h = state.viewport
+            whole = (w, h, np.hypot(w, h) / np.sqrt(2))[axis]
+            if not np.isfinite(whole):
+                raise ValueError(f"its {key} is a part of a page of unknown size ({text!r})")
+            return value / 100 * float(whole)
+        if unit not in ("", "px", *_UNITS):
+            raise ValueError(f"the unit of its {key} is not known ({text!r})")
+        if value and element.tag in _SHAPES:
+            self.note(element, bare=unit in ("", "px"))
+        return value * (_UNITS[unit] / _PX if unit in _UNITS else 1.0)
+
+    def note(self, element: Element, bare: bool) -> None:
+        if bare:
+            self.bare = self.bare or element.place
+        else:
+            self.real = self.real or element.place
+
+    def left_out(self, element: Element, reason: str) -> None:
+        if any(child.tag in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use") for child in element.children) or (
+            element.tag in (*_SHAPES, *_ASIDE, "use", "image")
+        ):
+            self.drawing.left_out.append(LeftOut(element.place, reason))
+        for child in element.children:  # so that what is hidden is known by name
+            names = (child.attributes.get(key, "") for key in ("id", "inkscape:label"))
+            self.drawing.known.update(dict.fromkeys(name for name in names if name))
+
+    def unreadable(self, element: Element, state: _State, reason: str) -> None:
+        names = (element.attributes.get(key, "") for key in ("id", "inkscape:label"))
+        self.drawing.unreadable.append(Unreadable(element.place, reason, (*state.names, *names)))
 
 
-def _points(segment: Any, t: Array) -> Array:
-    values = np.array([segment.point(float(x)) for x in t])
-    return np.stack([values.real, values.imag], axis=-1)
+def _rectangle(
+    x: float, y: float, w: float, h: float, rx: float | None, ry: float | None
+) -> list[list[Segment]]:
+    """A rectangle with round corners; a radius that is left out is the other, none exceeds half the side."""
+    rx, ry = (ry or 0.0) if rx is None else rx, (rx or 0.0) if ry is None else ry
+    rx, ry = min(rx, w / 2), min(ry, h / 2)
+    if not (rx and ry):
+        return [[Straight(np.array([(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)]))]]
+    parts: list[Segment] = []
+    corners = (x + w - rx, y + ry), (x + w - rx, y + h - ry), (x + rx, y + h - ry), (x + rx, y + ry)
+    axes = np.diag([rx, ry])
+    last = np.array([x + rx, y])
+    for k, corner in enumerate(corners):
+        arc = EllipticArc(np.array(corner), axes, (k - 1) * np.pi / 2, np.pi / 2)
+        ends = arc.points(np.inf)
+        parts += [Straight(np.array([last, ends[0]])), arc]
+        last = ends[-1]
+    return [[part for part in parts if extent(part.points(np.inf)) > 0]]
 
 
-def _scale(root: Any) -> float | None:
-    width, height = (_LENGTH.fullmatch(root.get(key, "")) for key in ("width", "height"))
-    box = root.get("viewBox", "").replace(",", " ").split()
-    if not (width and height and box):
+def _within(points: Callable[[float], Array], corners: Array) -> bool:
+    """Whether a curve lies in a window."""
+    from shapely import LineString, Polygon
+
+    rough = points(np.inf)
+    size = extent(rough)
+    shape = Polygon(corners)
+    return bool(
+        shape.is_valid and shape.buffer(2 * FLATNESS * size).covers(LineString(points(FLATNESS * size)))
+    )
+
+
+def _joined(outer: Array, inner: Array) -> Array:
+    return np.hstack([outer[:, :2] @ inner[:, :2], (outer[:, :2] @ inner[:, 2] + outer[:, 2])[:, None]])
+
+
+def _upright(matrix: Array) -> Array:
+    """The same, with y up."""
+    return matrix * np.array([[1.0], [-1.0]])
+
+
+def _number(text: str) -> float:
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2].lower() not in ("", "px", *_UNITS):
+        return np.nan
+    return float(match[1]) * (_UNITS[match[2].lower()] / _PX if match[2].lower() in _UNITS else 1.0)
+
+
+def _portion(text: str) -> float:
+    match = _LENGTH.fullmatch(text)
+    return float(match[1]) if match else 1.0
+
+
+def _width(text: str) -> float:
+    match = _LENGTH.fullmatch(text)
+    return float(match[1]) if match else 1.0
+
+
+def _painted(style: Mapping[str, str], kind: str, default: str) -> bool:
+    colour = (style.get(kind, "") or default).replace(" ", "").lower()
+    if colour in ("none", "transparent") or _portion(style.get(f"{kind}-opacity", "1") or "1") <= 0:
+        return False
+    if re.fullmatch(r"#(...0|......00)", colour):
+        return False
+    return not re.fullmatch(r"(rgba?|hsla?)\(.*[,/]0(\.0*)?%?\)", colour) or colour.count(",") == 2
+
+
+def _box(element: Element) -> Array | None:
+    text = element.attributes.get("viewBox")
+    if text is None:
         return None
-    if len(box) != 4:
-        raise InputError("a viewBox is four numbers", value=root.get("viewBox"))
+    words = text.replace(",", " ").split()
+    try:
+        box = np.array([float(word) for word in words])
+    except ValueError:
+        box = np.empty(0)
+    if len(box) != 4 or not np.all(np.isfinite(box)) or not np.all(box[2:] > 0):
+        raise InputError("a viewBox is four numbers, width and height positive", value=text)
+    return box
+
+
+def _fitted(box: Array, width: float, height: float, aspect: str) -> Array:
+    """From the units of a viewBox to those around a viewport at the origin."""
+    words = aspect.split()
+    align = words[0] if words else "xMidYMid"
+    sx, sy = width / box[2], height / box[3]
+    if align != "none":
+        sx = sy = max(sx, sy) if "slice" in words else min(sx, sy)
+    room = np.array([width - sx * box[2], height - sy * box[3]])
+    part = np.array(
+        [{"xMin": 0.0, "xMax": 1.0}.get(align[:4], 0.5), {"YMin": 0.0, "YMax": 1.0}.get(align[4:], 0.5)]
+    )
+    shift = part * room if align != "none" else np.zeros(2)
+    return np.array([[sx, 0.0, shift[0] - sx * box[0]], [0.0, sy, shift[1] - sy * box[1]]])
+
+
+def _transform(element: Element, style: Mapping[str, str]) -> Array:
+    """The matrix of an element's transform, from its attribute or style."""
+    for name in ("translate", "rotate", "scale"):
+        if style.get(name, "none").lower() not in ("", "none"):
+            raise ValueError(f"its style has {name}: {style[name]}, which is not read")
+    text = style.get("transform", "").strip()
+    if text.lower() in ("", "none"):
+        return _NO_TURN
+    css = text != element.attributes.get("transform", "").strip()
+    matrix, place = _NO_TURN, 0
+    while text[place:].strip(" \t\r\n,"):
+        match = _FUNCTION.match(text, place)
+        if match is None:
+            raise ValueError(f"its transform is not understood ({text!r})")
+        matrix = _joined(matrix, _function(match[1], match[2].replace(",", " ").split(), css, text))
+        place = match.end()
+    origin = style.get("transform-origin", "").replace(",", " ").split()
+    if not np.all(np.isfinite(matrix)):
+        raise ValueError(f"its transform is not finite ({text!r})")
+    if not origin or all(word in ("0", "left", "top", "0px", "0%") for word in origin):
+        return matrix
+    if style.get("transform-box", "view-box") != "view-box":
+        raise ValueError("its transform-box is not read")
+    if len(origin) > 1 and (origin[0] in ("top", "bottom") or origin[1] in ("left", "right")):
+        origin[:2] = origin[1], origin[0]
+    at = np.array([0.0 if w in ("left", "top") else _number(w) for w in origin[:2]])
+    if len(at) != 2 or not np.all(np.isfinite(at)):
+        raise ValueError(f"its transform-origin is not a point ({' '.join(origin)!r})")
+    there, back = np.hstack([np.eye(2), at[:, None]]), np.hstack([np.eye(2), -at[:, None]])
+    return _joined(_joined(there, matrix), back)
+
+
+_ANGLES = {"deg": 1.0, "rad": 180 / np.pi, "grad": 0.9, "turn": 360.0}
+
+
+def _function(name: str, words: list[str], css: bool, text: str) -> Array:
+    def bad() -> ValueError:
+        return ValueError(f"its transform is not understood ({text!r})")
+
+    def number(word: str, angle: bool, scale: bool = False) -> float:
+        match = _LENGTH.fullmatch(word)
+        if match is None:
+            raise bad()
+        value, unit = float(match[1]), match[2].lower()
+        if angle and unit in _ANGLES:
+            return value * _ANGLES[unit]
+        if scale and unit == "%":
+            return value / 100
+        if not angle and not scale and (unit == "px" or unit in _UNITS):
+            return _number(word)
+        if unit or (css and not scale and value):
+            raise bad()
+        return value
+
+    name = name if css else name.strip()
+    lower = name.lower() if css else name
+    known = {
+        "matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewX": (1,), "skewY": (1,),
+    }  # fmt: skip
+    if css:
+        known = {k.lower(): v for k, v in known.items()}
+        known |= {"translatex": (1,), "translatey": (1,), "scalex": (1,), "scaley": (1,), "skew": (1, 2)}
+    if lower not in known or len(words) not in known[lower]:
+        raise bad()
+    lower = lower.lower()
+    if lower == "matrix":
+        values = [number(word, False, True) for word in words]
+        return np.array(values).reshape(3, 2).T
+    if lower.startswith("translate"):
+        values = [number(word, False) for word in words]
+        values = [0.0, values[0]] if lower == "translatey" else [*values, 0.0]
+        return np.array([[1.0, 0.0, values[0]], [0.0, 1.0, values[1]]])
+    if lower.startswith("scale"):
+        values = [number(word, False, True) for word in words]
+        sx, sy = {"scalex": (values[0], 1.0), "scaley": (1.0, values[0])}.get(lower, (values[0], values[-1]))
+        return np.array([[sx, 0.0, 0.0], [0.0, sy, 0.0]])
+    angle = np.deg2rad(number(words[0], True))
+    if lower == "rotate":
+        c, s = np.cos(angle), np.sin(angle)
+        about = np.array([number(word, False) for word in words[1:]] or [0.0, 0.0])
+        turn = np.array([[c, -s], [s, c]])
+        return np.hstack([turn, (about - turn @ about)[:, None]])
+    other = np.deg2rad(number(words[1], True)) if len(words) > 1 else 0.0
+    across, down = (0.0, angle) if lower == "skewy" else (angle, other)
+    return np.array([[1.0, np.tan(across), 0.0], [np.tan(down), 1.0, 0.0]])
+
+
+def _page_unit(root: Element) -> float | None:
+    """The length of the drawing's unit [m], where its page has a real size."""
+    sides = [_LENGTH.fullmatch(root.attributes.get(key, "")) for key in ("width", "height")]
+    real = [m for m in sides if m and m[2].lower() in _UNITS]
+    box = _box(root)
+    if len(real) < 2 and not (real and box is not None):
+        return None
+    if box is None:
+        version = re.match(r"0\.([0-9]+)", root.attributes.get("inkscape:version", ""))
+        minor = float(f"0.{version[1]}") if version else 1.0
+        return _OLD_PX if minor < 0.92 else _PX
     scales = [
-        float(side[1]) * _UNITS[side[2]] / float(extent)
-        for side, extent in zip((width, height), box[2:], strict=True)
+        float(side[1]) * _UNITS[side[2].lower()] / extent
+        for side, extent in zip(sides, box[2:].tolist(), strict=True)
+        if side and side[2].lower() in _UNITS
     ]
     if not (min(scales) > 0 and max(scales) <= 1.001 * min(scales)):
         raise InputError(
             "width, height and viewBox have the same proportions",
-            value=[root.get("width"), root.get("height"), root.get("viewBox")],
+            value=[root.attributes.get(key) for key in ("width", "height", "viewBox")],
             hint="The drawing is stretched; save it without.",
         )
     return scales[0]

@@ -15,7 +15,8 @@ units: {length: mm, angle: deg}   # m, cm or mm; rad or deg. Without this line: 
 object:
   name: triangle
   # The outline seen from above: a list of [x, y] corners in either sense, in any coordinates you like.
-  # Or {circle: 40, centre: [0, 0]}, or a drawing: {file: part.svg} or {file: part.dxf}.
+  # Or {circle: 40, centre: [0, 0]}, or a drawing: {file: part.svg} or {file: part.dxf}; of a drawing, if you like,
+  # one layer, and a frame: {file: part.dxf, layer: CUT, origin: centroid, turn: 90}; or {file: mask.png, pixel: 0.4}.
   outline: [[19.667, -9.5], [19.667, 19.0], [-39.333, -9.5]]
   # Where it presses on the table: uniform (everywhere), outline (along its edge), {disc: 20}, {ring: 20}
   # (both take centre: [x, y]), or feet, {points: [[x, y, weight], ...]}. If it stands on something of

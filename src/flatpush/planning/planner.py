@@ -14,6 +14,7 @@ from ..errors import FlatpushError
 from ..geometry import pose_error
 from ..geometry.pose import Array
 from ..problem import Plan, Scene
+from ..problem.frame import moved_inside
 from ..simulation import certify
 from ..steering.fleet import Fleet
 from .answer import Answer
@@ -232,10 +233,12 @@ class Planner:
 def plan(scene: Scene) -> Plan:
     """The best plan found for a scene, with its certificate; see Planner.
 
+    An outline more than 100 of its sizes from its origin is moved there first: the plan's scene tells its poses.
+
     Returns:
         a Plan; where there is none, status "no_plan" and the reason of each push.
     """
-    return Planner(scene, tree=False).plan()
+    return Planner(moved_inside(scene), tree=False).plan()
 
 
 def _crowded(scene: Scene) -> bool:

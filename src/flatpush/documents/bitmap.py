@@ -1,0 +1,154 @@
+"""Reads the outline of an object from a bitmap: a mask, or a photograph on a plain background."""
+
+import os
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.pose import Array, cross
+from .drawing import LeftOut
+from .reading import read_bytes
+
+TOLERANCE = 1.0  # of what is found, in pixels: half of it is the bitmap's own, half that of the smoothing
+_BLUR = 1.0  # standard deviation of the blur that takes away the steps [pixels]
+_SIMPLE = 0.25  # corners that change the outline less are left out [pixels]
+_SPECK = 0.01  # what is smaller than this part of the object is dirt
+_PLAIN = 0.1  # greatest spread of a plain background, as a part of its contrast with the object
+_MOST_PIXELS = 40_000_000
+_LEAST = 40  # corners of an outline that may be one of pixels, and pixels that it is across
+
+
+def read_bitmap(path: str | os.PathLike[str]) -> tuple[Array, str, list[LeftOut], float]:
+    """The outline of the one object in a bitmap, in pixels from its upper left corner with y up, shape (n, 2).
+
+    Where there is transparency, what is opaque is the object; else what differs from the colour of the border.
+    With it come what was taken, what was left out, and the tolerance [pixels].
+
+    Raises:
+        InputError: if the file is no bitmap, its background is not plain, or it does not show one whole object.
+    """
+    source = os.fspath(path)
+    contrast = _contrast(path, source)
+    inside = contrast > _threshold(contrast)
+    border = np.concatenate([inside[0], inside[-1], inside[:, 0], inside[:, -1]])
+    if not inside.any() or inside.all():
+        raise InputError("the bitmap shows no object", source=source, hint=_HINT)
+    if border.any():
+        raise InputError("the object touches the edge of the bitmap", source=source, hint=_HINT)
+    from scipy import ndimage
+
+    labels, count = ndimage.label(inside, structure=np.ones((3, 3)))
+    sizes = np.bincount(labels.ravel())[1:]
+    large = np.flatnonzero(sizes > _SPECK * sizes.max()) + 1
+    if len(large) > 1:
+        centres = ndimage.center_of_mass(inside, labels, large[:4])
+        where = "; ".join(f"({x:.0f}, {y:.0f})" for y, x in centres)
+        raise InputError(
+            f"the bitmap shows {len(large)} objects, not one, around the pixels {where}",
+            source=source,
+            hint=_HINT,
+        )
+    whole = ndimage.binary_fill_holes(labels == large[0])
+    left = []
+    if count > 1:
+        left.append(LeftOut(f"{count - 1} specks", "smaller than 1 % of the object"))
+    if int(whole.sum()) > int(sizes.max()):
+        left.append(LeftOut("what is inside the outline", "inside the outline (a hole)"))
+    points = smooth_outline(whole) * (1.0, -1.0)
+    return points, f"the object of {int(sizes.max())} pixels", left, TOLERANCE
+
+
+def smooth_outline(mask: np.ndarray) -> Array:
+    """The outline of the only region of a mask without its steps, shape (n, 2): x to the right, y down [pixels].
+
+    A pixel of column c and row r covers c to c + 1 and r to r + 1.
+    """
+    from contourpy import LineType, contour_generator
+    from scipy import ndimage
+    from shapely import Polygon
+
+    pad = 4
+    blurred = ndimage.gaussian_filter(np.pad(mask, pad).astype(float), _BLUR)
+    lines = contour_generator(z=blurred, line_type=LineType.Separate).lines(0.5)
+    largest = max(lines, key=lambda line: Polygon(line).area)
+    return np.array(Polygon(largest + (0.5 - pad)).simplify(_SIMPLE).exterior.coords)[:-1]
+
+
+def without_steps(corners: Array) -> tuple[Array, float] | None:
+    """An outline of pixels without its steps, shape (n, 2), and the tolerance; None if it is not one of pixels.
+
+    Of pixels is what goes along the axes in multiples of one length, turning to the left and to the right by turns.
+    """
+    if len(corners) < _LEAST:
+        return None
+    edges = np.roll(corners, -1, axis=0) - corners
+    lengths = np.abs(edges).max(axis=1)
+    step = float(lengths.min())
+    if (
+        step <= 0
+        or np.abs(edges).min(axis=1).max() > 1e-6 * step
+        or np.ptp(corners, axis=0).max() < _LEAST * step
+    ):
+        return None
+    low = corners.min(axis=0)
+    cells = (corners - low) / step
+    if np.abs(cells - np.round(cells)).max() > 1e-3 or np.prod(np.ptp(cells, axis=0)) > _MOST_PIXELS:
+        return None
+    turns = np.sign(np.round(cross(np.roll(edges, 1, axis=0), edges) / step**2))
+    if np.mean(turns * np.roll(turns, 1) < 0) < 0.8:
+        return None
+    cells = np.round(cells).astype(int)
+    width, height = cells.max(axis=0)
+    flips = np.zeros((height, width + 1), dtype=int)
+    for (x, y0), (x1, y1) in zip(cells, np.roll(cells, -1, axis=0), strict=True):
+        if x == x1:
+            flips[min(y0, y1) : max(y0, y1), x] += 1
+    mask = np.cumsum(flips, axis=1)[:, :-1] % 2 == 1
+    return low + step * smooth_outline(mask), TOLERANCE * step
+
+
+_HINT = "Give a mask, or a photograph of the whole object alone on a plain background."
+
+
+def _contrast(path: str | os.PathLike[str], source: str) -> Array:
+    """How far each pixel is from the background, (rows, columns)."""
+    import io
+
+    from PIL import Image, UnidentifiedImageError
+
+    content = read_bytes(path, 100_000_000)
+    try:
+        with Image.open(io.BytesIO(content)) as image:
+            if image.width * image.height > _MOST_PIXELS:
+                raise InputError(
+                    "a bitmap has at most 40 million pixels", source=source, hint="Make it smaller."
+                )
+            colours = np.asarray(image.convert("RGBA"), dtype=float)
+    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            "this is not a bitmap", source=source, hint="Is it the right file, and is it complete?"
+        ) from error
+    if np.ptp(colours[..., 3]) > 0:
+        return colours[..., 3]
+    rgb = colours[..., :3]
+    rim = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
+    background = np.median(rim, axis=0)
+    contrast = np.abs(rgb - background).max(axis=-1)
+    spread = float(np.percentile(np.abs(rim - background).max(axis=-1), 95))
+    if spread > _PLAIN * max(float(np.percentile(contrast, 99)), 1.0):
+        raise InputError("the background of the bitmap is not plain", source=source, hint=_HINT)
+    return contrast
+
+
+def _threshold(values: Array) -> float:
+    """The value that parts two groups with the least variance inside them (Otsu)."""
+    counts, limits = np.histogram(values, bins=256)
+    middles = (limits[:-1] + limits[1:]) / 2
+    below = np.cumsum(counts)
+    above = below[-1] - below
+    sums = np.cumsum(counts * middles)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        between = below * above * (sums / below - (sums[-1] - sums) / above) ** 2
+    return float(limits[1:][int(np.nanargmax(between[:-1]))]) if len(values) else 0.0

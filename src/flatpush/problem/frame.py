@@ -1,0 +1,42 @@
+"""Moves the frame of an object that is drawn far from its origin into the object."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..geometry import Outline, transform
+from ..geometry.pose import Array
+from .scene import Object, Scene
+
+# An origin further from the object than so many of its sizes is moved. A plan's samples are poses of the origin: the
+# further it is, the denser they must be, and the more digits are lost.
+FAR = 100.0
+
+
+def far_origin(outline: Outline) -> Array | None:
+    """Where the frame O moves to, shape (2,) in O [m]: the outline's centroid; None if its origin is not far."""
+    centroid = outline.centroid
+    return centroid if np.hypot(*centroid) > FAR * outline.size else None
+
+
+def moved_inside(scene: Scene) -> Scene:
+    """The same scene with the origin of O in the object, if it was more than 100 sizes away; else the scene itself.
+
+    Start and goal are then poses of the outline's centroid, with the axes of the drawing.
+    """
+    origin = far_origin(scene.object.outline)
+    if origin is None:
+        return scene
+    obj = scene.object
+    support = obj.support_word or obj.support.translated(-origin)
+    moved = Object(obj.outline.translated(-origin), support, obj.friction, obj.surface, obj.name)
+
+    def pose(X_WO: Array) -> Array:
+        return np.array([*transform(X_WO, origin), X_WO[2]])
+
+    pushes = scene.pushes
+    if not isinstance(pushes, str):
+        pushes = tuple(replace(push, at=replace(push.at, point=push.at.point - origin)) for push in pushes)
+    return replace(
+        scene, object=moved, start=pose(scene.start_pose), goal=pose(scene.goal_pose), pushes=pushes
+    )
