@@ -1,0 +1,75 @@
+"""A pressure divided into patches with stated sizes, for bounds that must hold at every point of it."""
+
+import numpy as np
+
+from ..geometry.pose import Array
+from .pressure import Edges, Feet, Pressure, Round
+
+
+def patches(pressure: Pressure, count: int) -> tuple[Array, Array, Array]:
+    """About so many patches of a pressure, about its centre.
+
+    Returns:
+        A point in each patch, shape (n, 2) [m]; the loads, shape (n,), of sum 1; and a distance from that point that no
+        point of the patch exceeds, shape (n,) [m]. Feet are patches of no size.
+    """
+    if isinstance(pressure, Feet):
+        return pressure.points, pressure.weights, np.zeros(len(pressure.points))
+    if isinstance(pressure, Round):
+        return _of_round(pressure.radius, pressure.filled, count)
+    if not isinstance(pressure, Edges):
+        raise TypeError(f"no patches are known of a {type(pressure).__name__}")
+    return _of_inside(pressure.vertices, count) if pressure.filled else _of_edges(pressure.vertices, count)
+
+
+def _of_edges(vertices: Array, count: int) -> tuple[Array, Array, Array]:
+    ends = np.roll(vertices, -1, axis=0)
+    lengths = np.linalg.norm(ends - vertices, axis=1)
+    pieces = np.maximum(1, np.round(count * lengths / lengths.sum())).astype(int)
+    points = [
+        a + np.outer((np.arange(n) + 0.5) / n, b - a) for a, b, n in zip(vertices, ends, pieces, strict=True)
+    ]
+    each = np.repeat(lengths / pieces, pieces)
+    return np.concatenate(points), each / each.sum(), 0.5 * each
+
+
+def _of_inside(vertices: Array, count: int) -> tuple[Array, Array, Array]:
+    """Square cells, cut where they lie across the outline."""
+    import shapely
+
+    solid = shapely.Polygon(vertices)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    side = float(np.sqrt(solid.area / count))
+    number = np.maximum(1, np.ceil((high - low) / side)).astype(int)
+    step = (high - low) / number
+    i, j = (k.ravel() for k in np.meshgrid(*map(np.arange, number), indexing="ij"))
+    corner = low + np.stack([i, j], axis=1) * step
+    cells = shapely.intersection(shapely.box(*corner.T, *(corner + step).T), solid)
+    pieces = shapely.get_parts(cells)
+    pieces = pieces[shapely.area(pieces) > 0]
+    areas, middles = shapely.area(pieces), shapely.centroid(pieces)
+    points = np.stack([shapely.get_x(middles), shapely.get_y(middles)], axis=1)
+    corners, which = shapely.get_coordinates(pieces, return_index=True)
+    reach = np.zeros(len(pieces))
+    np.maximum.at(reach, which, np.linalg.norm(corners - points[which], axis=1))
+    return points, areas / areas.sum(), reach
+
+
+def _of_round(radius: float, filled: bool, count: int) -> tuple[Array, Array, Array]:
+    rings = max(1, round(np.sqrt(count / np.pi))) if filled else 1
+    found = []
+    for k in range(rings):
+        inner, outer = (radius * k / rings, radius * (k + 1) / rings) if filled else (radius, radius)
+        number = max(6, round(count * (outer**2 - inner**2) / radius**2)) if filled else count
+        angles = 2 * np.pi * (np.arange(number) + 0.5) / number
+        middle = 0.5 * (inner + outer)
+        # Along the ring no point is farther than half the sector at the outer radius, across it half the width.
+        reach = float(np.hypot(0.5 * (outer - inner), np.pi * outer / number))
+        load = (outer**2 - inner**2) / number if filled else 1.0
+        found.append(
+            np.column_stack(
+                [middle * np.cos(angles), middle * np.sin(angles), np.full((number, 2), [load, reach])]
+            )
+        )
+    x, y, loads, reach_of = np.concatenate(found).T
+    return np.stack([x, y], axis=1), loads / loads.sum(), reach_of
