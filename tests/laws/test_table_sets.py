@@ -137,9 +137,7 @@ def test_the_margin_falls_as_the_set_grows_and_bounds_close_with_smaller_patches
     assert np.all(steps[1:] < 0.6 * steps[:-1])
 
 
-@pytest.mark.parametrize(
-    ("name", "radii"), [("rim", (32.7, 39.2, 45.9)), ("face", (22.5, 24.8, 27.3))]
-)
+@pytest.mark.parametrize(("name", "radii"), [("rim", (32.7, 39.2, 45.9)), ("face", (22.5, 24.8, 27.3))])
 def test_turning_radii_of_a_rectangle(name, radii):
     """As tight as a prototype's (loads ± 0, 10, 20 %; a fifth of μ and spacing in reserve), and really kept."""
     support = SUPPORTS[name].centred()

@@ -240,8 +240,8 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     found = []
     for sense in (1.0, -1.0):
         _, tight = _tightest(sketch, cones, families, leans, sense)
-        best = np.argsort(-tight, kind="stable")[:TRIED]
-        centres, tight = _tightest(tables, cones, families[best], leans[best], sense)
+        first = np.argsort(-tight, kind="stable")[:TRIED]
+        centres, tight = _tightest(tables, cones, families[first], leans[first], sense)
         found.append(centres[tight > 0])
     lefts, rights = found
     if not len(lefts) or not len(rights):
@@ -274,7 +274,7 @@ def _tightest(
     high = np.where(count < len(turns), turns[np.minimum(count, len(turns) - 1)], low)
     for _ in range(8):
         middle = 0.5 * (low + high)
-        fine = _kept(tables, cones, motions(sense * middle)) & (low > 0)
+        fine = np.logical_and(_kept(tables, cones, motions(sense * middle)), low > 0)
         low, high = np.where(fine, middle, low), np.where(fine, high, middle)
     with np.errstate(divide="ignore", invalid="ignore"):
         V = motions(sense * low)
