@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from flatpush.control import Camera, Measurement, SimulatedSensor
-from flatpush.control.closed_loop import drive
-from flatpush.control.gains import Gains
-from flatpush.control.horizon import HorizonController
-from flatpush.control.linearisation import TrackingController
-from flatpush.control.path_following import PathController
-from flatpush.control.reference import PathReference
-from flatpush.control.rollouts import closed_loops
+from flatpush.control.horizon.controller import HorizonController
+from flatpush.control.laws.gains import Gains
+from flatpush.control.laws.linearisation import TrackingController
+from flatpush.control.laws.many_runs import closed_loops
+from flatpush.control.laws.path_following import PathController
+from flatpush.control.laws.reference import PathReference
+from flatpush.control.loop.closed_loop import drive
 from flatpush.experiments.feedback import PATIENCE, task
 from flatpush.experiments.fig4 import NOMINAL, matrix, push_model
 from flatpush.geometry import compose

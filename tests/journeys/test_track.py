@@ -11,8 +11,9 @@ from tests.unit.test_control import PERFECT
 import flatpush as fp
 from flatpush.cli.app import app
 from flatpush.control import Measurement, SimulatedSensor
-from flatpush.control.closed_loop import drive
-from flatpush.control.plan_controller import PlanController, goal_error
+from flatpush.control.loop.closed_loop import drive
+from flatpush.control.tracking.plan_controller import PlanController
+from flatpush.control.tracking.simulated_run import goal_error
 from flatpush.geometry import compose
 from flatpush.simulation.plant import Plant
 

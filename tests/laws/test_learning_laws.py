@@ -6,13 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flatpush import InputError
-from flatpush.control.learning import (
-    FrictionBounds,
-    SteeringBelief,
-    SteeringEstimate,
-    probing_velocity,
-    sticking_displacement,
-)
+from flatpush.control.learning.belief import SteeringBelief, SteeringEstimate, sticking_displacement
+from flatpush.control.learning.friction_bounds import FrictionBounds
+from flatpush.control.learning.probing import probing_velocity
 
 COF, RHO = np.array([0.0012, -0.0007]), 3.1e-4
 CONTACTS = np.array([[-0.025, 0.002], [0.003, -0.0175], [0.025, -0.004]])

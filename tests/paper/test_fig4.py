@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flatpush.control.gains import HOLDS, Gains
+from flatpush.control.laws.gains import HOLDS, Gains
 from flatpush.experiments import experiment, fig4
 
 # docs/errata.md: settled heading bias of the printed perturbed A, r in units of the normalising length [deg].

@@ -7,14 +7,14 @@ import pytest
 
 import flatpush as fp
 from flatpush.control import Camera, Measurement, SimulatedSensor
-from flatpush.control.closed_loop import drive
-from flatpush.control.gains import HOLDS, Gains, limits
-from flatpush.control.learning import SteeringBelief
-from flatpush.control.learning_controller import LearningController
-from flatpush.control.linearisation import PostureController, TrackingController
-from flatpush.control.path_following import PathController
-from flatpush.control.reference import AbstractReference, FlatState, PathReference, check_reference
-from flatpush.control.steering_model import SteeringModel
+from flatpush.control.laws.gains import HOLDS, Gains, limits
+from flatpush.control.laws.linearisation import PostureController, TrackingController
+from flatpush.control.laws.path_following import PathController
+from flatpush.control.laws.reference import AbstractReference, FlatState, PathReference, check_reference
+from flatpush.control.laws.steering_model import SteeringModel
+from flatpush.control.learning.belief import SteeringBelief
+from flatpush.control.loop.closed_loop import drive
+from flatpush.control.tracking.learning_controller import LearningController
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, pose_error, transform
 from flatpush.simulation.plant import Plant
@@ -80,7 +80,7 @@ def test_references_of_a_plan_are_exact(one_finger_plan, timed):
 
 def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():
     """z̈ = w for an asymmetric contact (c ≠ 0): the mean over a small tick of what the flat point does is w."""
-    from flatpush.control.laws.plain import AFTER, linearised, point_velocity
+    from flatpush.control.laws.formulas import AFTER, linearised, point_velocity
 
     flat = fp.flat_output(fp.PointContact([0.006, -0.02], [0.1, 0.995], 0.6), Ellipsoid(NOMINAL))
     assert abs(flat.along) > 1e-3

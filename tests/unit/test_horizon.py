@@ -7,12 +7,12 @@ import pytest
 
 import flatpush as fp
 from flatpush.control import ARRIVED, Camera, Measurement, SimulatedSensor
-from flatpush.control.closed_loop import drive
-from flatpush.control.contact_car import contact_car, drift_of, sides_of
-from flatpush.control.horizon import HorizonController
-from flatpush.control.landings import next_push
-from flatpush.control.rest_of_path import biarc, rest_of_path
-from flatpush.control.steering import shared, steering_of
+from flatpush.control.horizon.contact_car import contact_car, drift_of, sides_of
+from flatpush.control.horizon.controller import HorizonController
+from flatpush.control.horizon.landings import next_push
+from flatpush.control.horizon.push_knowledge import shared, steering_of
+from flatpush.control.horizon.rest_of_path import biarc, rest_of_path
+from flatpush.control.loop.closed_loop import drive
 from flatpush.experiments.feedback import attempt, objects, perturbed, task
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, cross, exp, pose_error
@@ -278,21 +278,21 @@ def test_while_pushing_the_centre_of_friction_of_a_perturbed_support_is_found():
 def test_slip_bounds_the_friction_from_above_and_sticking_from_below():
     controller = HorizonController.of(task(1).scene)
     state = controller.start()
-    from flatpush.control.horizon_state import Mark
+    from flatpush.control.horizon.state import LearningWindow
 
     state = replace(state, push=0)
     tip = controller.planner.usable[0].placement.tips[0]
-    mark = Mark(0.0, 0.001, tip, np.array([0.02, 0.0]), (0.2, 0.22))
+    window = LearningWindow(0.0, 0.001, tip, np.array([0.02, 0.0]), (0.2, 0.22))
     pose = np.zeros(3)
-    stuck = controller.watch.learned(state, mark, pose, 0.001, tip).bounds
+    stuck = controller.observer.learned(state, window, pose, 0.001, tip).bounds
     assert stuck.low == pytest.approx(0.11)
     assert stuck.high == np.inf
-    slid = controller.watch.learned(state, mark, pose, 0.001, tip + np.array([0.0, 0.003])).bounds
+    slid = controller.observer.learned(state, window, pose, 0.001, tip + np.array([0.0, 0.003])).bounds
     assert slid.low == 0
     assert slid.high == pytest.approx(0.32)
     # What is then believed narrows the cone of the cars.
     narrow = replace(state, bounds=replace(slid, high=0.25))
-    assert controller.watch.car(narrow, 0, tip).radius > controller.watch.car(state, 0, tip).radius
+    assert controller.observer.car(narrow, 0, tip).radius > controller.observer.car(state, 0, tip).radius
 
 
 # Bad input ------------------------------------------------------------------------------------------------------------

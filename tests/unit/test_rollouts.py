@@ -5,11 +5,12 @@ import pytest
 from tests.unit.test_control import NOMINAL, UNIT, run, square_push
 
 import flatpush as fp
-from flatpush.control.gains import Gains
-from flatpush.control.linearisation import TrackingController
-from flatpush.control.path_following import PathController
-from flatpush.control.reference import PathReference
-from flatpush.control.rollouts import OUTCOMES, closed_loops, plain
+from flatpush.control.laws.gains import Gains
+from flatpush.control.laws.linearisation import TrackingController
+from flatpush.control.laws.many_runs import OUTCOMES, closed_loops
+from flatpush.control.laws.path_following import PathController
+from flatpush.control.laws.reference import PathReference
+from flatpush.control.laws.rollout import rollout
 
 TILTED = np.array([[1.0719, -0.0177, -0.1782], [-0.0177, 1.0417, 0.1599], [-0.1782, 0.1599, 1.5104]])
 TILTED = TILTED / np.outer([1, 1, UNIT], [1, 1, UNIT])
@@ -38,7 +39,7 @@ def test_compiled_runs_are_the_plain_ones(law, friction):
     row = np.array([*m.flat_point, m.heading, m.left, m.right, *m.contact, 0, 1])
     for k, start in enumerate(starts):
         way = np.full((241, 3), np.nan)
-        x, y, turn, worst, stuck, along, outcome = plain.rollout(
+        x, y, turn, worst, stuck, along, outcome = rollout(
             law, 0, path.table, path.speed, row, np.array(gains), 60.0, 240, start, A, np.zeros(2), friction, UNIT,
             np.zeros((1, 3)), way,
         )  # fmt: skip

@@ -1,18 +1,25 @@
 """flatpush track: follows a plan in the simulator under feedback."""
 
+from __future__ import annotations
+
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from ..errors import InputError
 from .common import error_text, numbers, pose_text, print_json
 
+if TYPE_CHECKING:
+    from ..control import ClosedLoopRun, ControllerState
+    from ..control.tracking.simulated_run import Law, Timing
+
 CONTROLLERS = ("path", "dfl", "horizon")
 TIMINGS = ("even", "plan")
-MOST_TOLD = 8
+MOST_TOLD, MOST_NOTES = 8, 20
 
 
 def command(
@@ -39,6 +46,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Follow PLAN under feedback, in the contact simulator with a simulated camera."""
+    from ..control import Camera
+    from ..control.tracking.simulated_run import TrackedRun, goal_error
     from ..documents import check_writable, load_plan
 
     if controller not in CONTROLLERS:
@@ -54,97 +63,31 @@ def command(
         numbers(centre, 2, "--centre") or [],
         numbers(start, 3, "--start") or [],
     )
+    asked = TrackedRun(
+        cast("Law", controller),
+        rate,
+        cast("Timing", timing),
+        learn,
+        frequency,
+        damping,
+        Camera(camera, latency, spread[0] / 1000, math.radians(spread[1]), dropped / 100),
+        friction,
+        (shift[0] / 1000, shift[1] / 1000),
+        (off[0] / 1000, off[1] / 1000, math.radians(off[2])),
+        seed,
+    )
     loaded = load_plan(plan)
     if figure is not None:
         from ..view.figure import check_ending
 
         check_writable(figure)
         check_ending(figure, (".svg", ".png"))
-    run = _run(
-        loaded, controller, rate, spread, camera, latency, dropped, friction, shift, off, timing, frequency,
-        damping, learn, seed,
-    )  # fmt: skip
-    result = _result(loaded, run, controller)
-    if figure is not None:
-        from ..view.track_figure import track_figure
-
-        off_text = error_text(result["distance"], result["turn"])
-        track_figure(
-            loaded, run, figure, f"{controller} at {rate:g} Hz: {run.outcome}, off the goal by {off_text}"
-        )
-    if as_json:
-        print_json(result)
-        return 0
-    _tell(result, run, figure)
-    return 0
-
-
-def _run(
-    plan: Any, name: Any, rate: float, spread: list[float], camera: float, latency: float, dropped: float,
-    friction: float | None, shift: list[float], off: list[float], timing: Any, frequency: float, damping: float,
-    learn: bool, seed: int,
-) -> Any:  # fmt: skip
-    import numpy as np
-    from shapely import MultiPoint, Point
-
-    from ..control import Camera, SimulatedSensor
-    from ..control.closed_loop import drive
-    from ..control.gains import Gains
-    from ..control.plan_controller import PlanController
-    from ..simulation.plant import Plant
-
-    eye = Camera(camera, latency, spread[0] / 1000, math.radians(spread[1]), dropped / 100)
-    if not (math.isfinite(rate) and rate > 0):
-        raise InputError("a rate is positive", key="--rate", value=rate)
-    if name == "horizon":
-        from ..control.horizon import HorizonController
-
-        law: Any = HorizonController.of(plan, rate=rate, latency=latency, learn=learn)
-    else:
-        sd = (max(eye.position, 1e-5), max(eye.angle, 1e-4))
-        gains = Gains.of(frequency, damping)
-        law = PlanController.of(
-            plan, name, rate, gains=gains, timing=timing, learn=learn, sd=sd, stale=0.5 + latency
-        )
-    scene, first = plan.scene, plan.pushes[0]
-    if any(not np.allclose(p.fingers.shape, first.fingers.shape) for p in plan.pushes):
-        raise InputError("every push of a tracked plan has as many fingers as the first")
-    cof = scene.object.cof + np.array(shift) / 1000
-    if not MultiPoint(scene.object.outline.polyline()).convex_hull.covers(Point(cof)):
-        raise InputError("--centre takes the centre of friction off the object", value=shift)
-    plant = Plant(scene.object, first.fingers, scene.pusher.tip_radius, friction=friction, cof=cof)
-    # The horizon controller looks, and lands again, as often as it takes.
-    patience = 3 * plan.duration + (200 if name == "horizon" else 10)
-    error = np.array([off[0] / 1000, off[1] / 1000, math.radians(off[2])])
-    live = sys.stderr.isatty()
-
-    def told(time: float, state: Any) -> None:
-        if live and round(time * rate) % max(1, round(rate / 4)) == 0:
-            sys.stderr.write(f"\r{time:7.2f} s of {plan.duration:.1f} s planned: {state.mode:<12}")
-            sys.stderr.flush()
-
-    run = drive(
-        law, plant, scene.start_pose + error, _landing(plan, first),
-        SimulatedSensor(eye, np.random.default_rng(seed)), patience, told=told,
-    )  # fmt: skip
-    if live:
+    run = asked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
+    if sys.stderr.isatty():
         sys.stderr.write("\n")
-    return run
-
-
-def _landing(plan: Any, first: Any) -> Any:
-    """Where the pusher waits: twice the approach distance behind the first contact, as planned."""
-    from ..geometry import compose
-
-    return compose(first.pusher[0], [-2 * plan.scene.pusher.approach, 0.0, 0.0])
-
-
-def _result(plan: Any, run: Any, name: str) -> dict[str, Any]:
-    from ..control.plan_controller import goal_error
-
-    distance, turn = goal_error(plan, run.object[-1])
-    return {
-        "controller": name,
+    distance, turn = goal_error(loaded, run.object[-1])
+    result = {
+        "controller": controller,
         "outcome": run.outcome,
         "final_pose": [float(x) for x in run.object[-1]],
         "distance": distance,
@@ -152,11 +95,32 @@ def _result(plan: Any, run: Any, name: str) -> dict[str, Any]:
         "time": float(run.times[-1]),
         "modes": {m: run.modes.count(m) for m in dict.fromkeys(run.modes)},
         "contacts": {m: run.contacts.count(m) for m in dict.fromkeys(run.contacts)},
-        "notes": [[t, text] for t, text in run.notes[:20]],
+        "notes": [[t, text] for t, text in run.notes[:MOST_NOTES]],
     }
+    if figure is not None:
+        from ..view.track_figure import track_figure
+
+        title = f"{controller} at {rate:g} Hz: {run.outcome}, off the goal by {error_text(distance, turn)}"
+        track_figure(loaded, run, figure, title)
+    if as_json:
+        print_json(result)
+    else:
+        _tell(result, run, figure)
+    return 0
 
 
-def _tell(result: dict[str, Any], run: Any, figure: Path | None) -> None:
+def _progress(planned: float, rate: float) -> Callable[[float, ControllerState], None]:
+    """Writes the time and the mode four times a second."""
+
+    def told(time: float, state: ControllerState) -> None:
+        if round(time * rate) % max(1, round(rate / 4)) == 0:
+            sys.stderr.write(f"\r{time:7.2f} s of {planned:.1f} s planned: {state.mode:<12}")
+            sys.stderr.flush()
+
+    return told
+
+
+def _tell(result: dict[str, Any], run: ClosedLoopRun, figure: Path | None) -> None:
     typer.echo(
         f"{result['controller']}: {result['outcome']} after {result['time']:.2f} s;"
         f" the object is at {pose_text(result['final_pose'])}"

@@ -1,19 +1,43 @@
-"""Keeping a push on its way: measurements, learning while pushing, receding horizon."""
+"""Keeping a push on its way: controllers, the loop around them, and what a controller learns while it pushes.
 
-from .controller import ARRIVED, AbstractController, ControllerState
-from .learning import SteeringBelief, SteeringEstimate
-from .measurement import Command, Measurement
-from .sensor import AbstractSensor, Camera, SimulatedSensor
+Closing a loop of your own takes a controller, a sensor and a plant; see docs/control.md, "Your own loop".
+"""
+
+from .horizon.controller import HorizonController
+from .laws.gains import Gains
+from .laws.linearisation import PostureController, TrackingController
+from .laws.path_following import PathController
+from .laws.reference import AbstractReference, PathReference
+from .laws.steering_model import SteeringModel
+from .learning.belief import SteeringBelief, SteeringEstimate
+from .loop.closed_loop import ClosedLoopRun, drive
+from .loop.controller import ARRIVED, AbstractController, ControllerState
+from .loop.measurement import Command, Measurement
+from .loop.sensor import AbstractSensor, Camera, SimulatedSensor
+from .tracking.learning_controller import LearningController
+from .tracking.plan_controller import PlanController
 
 __all__ = [
     "ARRIVED",
     "AbstractController",
+    "AbstractReference",
     "AbstractSensor",
     "Camera",
+    "ClosedLoopRun",
     "Command",
     "ControllerState",
+    "Gains",
+    "HorizonController",
+    "LearningController",
     "Measurement",
+    "PathController",
+    "PathReference",
+    "PlanController",
+    "PostureController",
     "SimulatedSensor",
     "SteeringBelief",
     "SteeringEstimate",
+    "SteeringModel",
+    "TrackingController",
+    "drive",
 ]

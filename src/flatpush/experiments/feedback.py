@@ -20,9 +20,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..control import Camera, SimulatedSensor
-from ..control.closed_loop import ClosedLoopRun, drive
-from ..control.horizon import HorizonController
-from ..control.plan_controller import PlanController
+from ..control.horizon.controller import HorizonController
+from ..control.loop.closed_loop import ClosedLoopRun, drive
+from ..control.tracking.plan_controller import PlanController
 from ..errors import FlatpushError
 from ..friction import Support
 from ..friction.draws import draw_loads

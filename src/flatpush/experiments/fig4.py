@@ -10,13 +10,13 @@ import numpy as np
 
 from ..contact import PointContact
 from ..control import Camera, SimulatedSensor, SteeringBelief
-from ..control.closed_loop import drive
-from ..control.gains import HOLDS, Gains, Hold
-from ..control.learning_controller import LearningController
-from ..control.linearisation import TrackingController
-from ..control.reference import PathReference, dubins_of
-from ..control.rollouts import closed_loops
-from ..control.steering_model import SteeringModel
+from ..control.laws.gains import HOLDS, Gains, Hold
+from ..control.laws.linearisation import TrackingController
+from ..control.laws.many_runs import closed_loops
+from ..control.laws.reference import PathReference, dubins_of
+from ..control.laws.steering_model import SteeringModel
+from ..control.loop.closed_loop import drive
+from ..control.tracking.learning_controller import LearningController
 from ..friction import Ellipsoid
 from ..geometry import compose, pose_error, wrap_angle
 from ..geometry.pose import Array

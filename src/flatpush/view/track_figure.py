@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..control.closed_loop import ClosedLoopRun
+from ..control.loop.closed_loop import ClosedLoopRun
 from ..documents.atomic import write_atomically
 from ..geometry import transform
 from ..geometry.pose import Array

@@ -1,1 +1,1 @@
-"""Feedback laws on plain numbers, and the same compiled."""
+"""Feedback laws of one push that sticks: what the push is taken to be, where it should go, and how it gets there."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry.pose import Array
-from ..planning.options import PushOption, push_option
-from ..problem import Scene
+from ...geometry.pose import Array
+from ...planning.options import PushOption, push_option
+from ...problem import Scene
+from ..learning.belief import SteeringBelief, SteeringEstimate
 from .contact_car import contact_car, drift_of, sides_of
-from .learning import SteeringBelief, SteeringEstimate
 
 # The prior: standard deviations of each coordinate of the centre of friction, by the object's size, and of ρ, by
 # itself.

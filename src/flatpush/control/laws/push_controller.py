@@ -6,12 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..errors import InputError
-from ..geometry.pose import Array
-from .controller import AbstractController, ControllerState
-from .frames import Seen, after, predicted, refusal, with_command
-from .laws.plain import RAMP, point_velocity
-from .measurement import STOP, Command, Measurement
+from ...errors import InputError
+from ...geometry.pose import Array
+from ..loop.controller import AbstractController, ControllerState
+from ..loop.frames import Seen, after, predicted, refusal, with_command
+from ..loop.measurement import STOP, Command, Measurement
+from .formulas import RAMP, point_velocity
 from .steering_model import SteeringModel
 
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry import pose_error, wrap_angle
-from ..geometry.pose import Array
-from .controller import ARRIVED
+from ...errors import InputError
+from ...geometry import pose_error, wrap_angle
+from ...geometry.pose import Array
+from ..loop.controller import ARRIVED
+from ..loop.measurement import STOP, Command
+from .formulas import linearised
 from .gains import HOLDS, Gains, Hold
-from .laws.plain import linearised
-from .measurement import STOP, Command
 from .path_following import path_command
 from .push_controller import AbstractPushController, PushState, pusher_velocity
 from .reference import AbstractReference, PathReference, check_reference

@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry.pose import Array
+from ...errors import InputError
+from ...geometry.pose import Array
 
 #: How the pusher moves during a tick. "ramp": ṡ and ω are held and the flat speed ramps, the pusher's velocity is the
 #: mean over the tick. "before", "after": the pusher's velocity is held, and the flat speed is updated before, or after,

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry import Outline, perpendicular, pose_error, relative, transform, wrap_angle
-from ..geometry.pose import Array
-from ..problem import Scene
+from ...geometry import Outline, perpendicular, pose_error, relative, transform, wrap_angle
+from ...geometry.pose import Array
+from ...problem import Scene
+from ..learning.belief import sticking_displacement
+from ..loop.frames import after
+from ..loop.measurement import Measurement
 from .contact_car import ContactCar, contact_car
-from .frames import after
-from .horizon_state import HorizonState, Mark
-from .learning import sticking_displacement
-from .measurement import Measurement
-from .steering import shared
+from .push_knowledge import shared
+from .state import HorizonState, LearningWindow
 
 # Feedback may use all but this share of the friction cone.
 EDGE = 0.2
@@ -34,7 +34,7 @@ SPREAD = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Watch:
+class ContactObserver:
     """Follows the contact of one finger through a push, frame by frame.
 
     Attributes:
@@ -63,19 +63,21 @@ class Watch:
             x, y, turn = model.moved(x, y, turn, float(u[0]), float(u[1]), dt)
         innovation = pose_error(frame.object, [x, y, turn])
         believed = np.array([x, y, turn]) + innovation * (POSITION_GAIN, POSITION_GAIN, ANGLE_GAIN)
-        believed = self._touching(state.car, believed, np.asarray(frame.pusher, dtype=float))
+        believed = self._at_edge(state.car, believed, np.asarray(frame.pusher, dtype=float))
         tip = state.tip + PLACE_GAIN * (relative(frame.object, frame.pusher)[:2] - state.tip)
         state = replace(state, tip=tip, seen=after(state.seen, replace(frame, object=believed)))
-        if state.mark is not None:
-            mark = self.along(state, state.mark, before, np.asarray(frame.pusher, dtype=float), believed[2])
-            state = replace(state, mark=mark)
-            if float(np.hypot(*mark.way)) >= STRETCH:
-                state = self.learned(state, mark, np.asarray(frame.object, dtype=float), self.sd, tip)
-                state = replace(state, mark=Mark(float(frame.object[2]), self.sd, tip))
-        gap = touched(self.scene.object.outline, tip)[2] - self.scene.pusher.tip_radius
+        if state.window is not None:
+            window = self.along(
+                state, state.window, before, np.asarray(frame.pusher, dtype=float), believed[2]
+            )
+            state = replace(state, window=window)
+            if float(np.hypot(*window.way)) >= STRETCH:
+                state = self.learned(state, window, np.asarray(frame.object, dtype=float), self.sd, tip)
+                state = replace(state, window=LearningWindow(float(frame.object[2]), self.sd, tip))
+        gap = nearest_contact(self.scene.object.outline, tip)[2] - self.scene.pusher.tip_radius
         return replace(state, car=self.car(state, state.push, tip), gap=gap)
 
-    def _touching(self, car: ContactCar, pose: Array, hand: Array) -> Array:
+    def _at_edge(self, car: ContactCar, pose: Array, hand: Array) -> Array:
         """A pose moved along the normal so that the finger touches the edge, if it is near enough to do so."""
         c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
         n, p = car.normal, car.contact
@@ -88,7 +90,7 @@ class Watch:
 
     def car(self, state: HorizonState, push: int, tip: ArrayLike) -> ContactCar | None:
         """Of a finger of a push whose centre is at a place in O, as far as is now known."""
-        point, normal, _ = touched(self.scene.object.outline, tip)
+        point, normal, _ = nearest_contact(self.scene.object.outline, tip)
         known, believed = state.steering[push], self.scene.object.friction
         low, high = (1 - SPREAD) * believed, (1 + SPREAD) * believed
         friction = min(max(state.bounds.clip(believed), low), high) * LESS ** state.failures[push]
@@ -108,9 +110,9 @@ class Watch:
         )
 
     def along(
-        self, state: HorizonState, mark: Mark, before: Measurement, pusher: Array, turned: float
-    ) -> Mark:
-        """The mark after the pusher has gone from a frame to X_WE, where the object is turned so far."""
+        self, state: HorizonState, window: LearningWindow, before: Measurement, pusher: Array, turned: float
+    ) -> LearningWindow:
+        """The window after the pusher has gone from a frame to X_WE, where the object is turned so far."""
         assert state.car is not None
         reach = [self.scene.pusher.tip_radius, 0.0]
         step = transform(pusher, reach) - transform(before.pusher, reach)
@@ -120,27 +122,29 @@ class Watch:
         model = state.car.model
         speed, omega = model.motion(float(moved[0]), float(moved[1]))
         moved -= model.across(speed, omega) * perpendicular(model.direction)
-        return replace(mark, way=mark.way + moved)
+        return replace(window, way=window.way + moved)
 
-    def learned(self, state: HorizonState, mark: Mark, pose: Array, sd: float, tip: Array) -> HorizonState:
+    def learned(
+        self, state: HorizonState, window: LearningWindow, pose: Array, sd: float, tip: Array
+    ) -> HorizonState:
         """What a stretch of sticking that ends at a pose tells of the axle; sticking or slipping, of the friction."""
-        if float(np.hypot(*mark.way)) < LEAST:
+        if float(np.hypot(*window.way)) < LEAST:
             return state
-        ratios = mark.ratios
-        if float(np.hypot(*(tip - mark.tip))) > (SLIPPED if mark.hand is None else 0.5 * SLIPPED):
+        ratios = window.ratios
+        if float(np.hypot(*(tip - window.tip))) > (SLIPPED if window.hand is None else 0.5 * SLIPPED):
             return replace(state, bounds=state.bounds.slipped(max(ratios), DOUBT)) if ratios else state
         if ratios:
             state = replace(state, bounds=state.bounds.stuck(float(np.mean(ratios)), DOUBT))
-        point, _, _ = touched(self.scene.object.outline, tip)
-        turn = float(wrap_angle(pose[2] - mark.angle))
-        Y, S = sticking_displacement(point, mark.way, turn, math.hypot(sd, mark.sd))
+        point, _, _ = nearest_contact(self.scene.object.outline, tip)
+        turn = float(wrap_angle(pose[2] - window.angle))
+        Y, S = sticking_displacement(point, window.way, turn, math.hypot(sd, window.sd))
         known = list(state.steering)
         known[state.push] = known[state.push].observed(point, Y, S)
         # The other pushes are told when the next of them is chosen.
         return replace(state, steering=shared(known, state.push))
 
 
-def touched(outline: Outline, tip: ArrayLike) -> tuple[Array, Array, float]:
+def nearest_contact(outline: Outline, tip: ArrayLike) -> tuple[Array, Array, float]:
     """The point of an outline nearest to a fingertip's centre in O, the inward normal there, and the distance."""
     p = np.asarray(tip, dtype=float)
     found = outline.nearest(p)

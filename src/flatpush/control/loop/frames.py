@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.pose import Array
+from ...geometry.pose import Array
+from ..laws.steering_model import SteeringModel
 from .measurement import Measurement
-from .steering_model import SteeringModel
 
 # A frame from later than this is from another clock [s].
 AHEAD = 1e-6

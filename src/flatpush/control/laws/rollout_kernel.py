@@ -1,31 +1,19 @@
-"""Closed-loop runs compiled from rollouts.plain, many at a time."""
+"""Closed-loop runs compiled from laws.rollout, many at a time."""
 
-from types import FunctionType
-from typing import Any
-
-import numba as nb
-
+from ...compiled import inner, kernel
 from ...geometry.pose import Array
-from ..laws import kernels as laws
-from . import plain
+from . import formula_kernels as laws
+from . import rollout as one
 
-_compiled = nb.njit(cache=True, nogil=True, error_model="numpy")
-
-contact_twist = _compiled(plain.contact_twist)
+contact_twist = inner(one.contact_twist)
 _names = {
     name: getattr(laws, name)
     for name in ("along_path", "linearised", "nearest", "place", "point_velocity", "wrapped")
 }
-rollout = _compiled(
-    FunctionType(
-        plain.rollout.__code__,
-        {**plain.rollout.__globals__, **_names, "contact_twist": contact_twist},
-        "rollout",
-    )
-)
+rollout = inner(laws.calling(one.rollout, {**_names, "contact_twist": contact_twist}))
 
 
-@_compiled
+@kernel()
 def many(
     first: int,
     last: int,
@@ -45,7 +33,7 @@ def many(
     noises: Array,
     ways: Array,
     out: Array,
-) -> Any:
+) -> None:
     """rollout for the runs first to last; surfaces, cofs, mus and noises have one row for all or one for each.
 
     ways: (n, ticks + 1, 3) or (n, 0, 3). out: (n, 7), written.

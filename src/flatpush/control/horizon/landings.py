@@ -5,9 +5,9 @@ from itertools import islice
 
 import numpy as np
 
-from ..geometry.pose import Array
-from ..planning.refine import improvements
-from ..steering.fleet import Fleet
+from ...geometry.pose import Array
+from ...planning.refine import improvements
+from ...steering.fleet import Fleet
 from .contact_car import ContactCar
 
 

@@ -22,9 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry import perpendicular, rotate
-from ..geometry.pose import Array
+from ...errors import InputError
+from ...geometry import perpendicular
+from ...geometry.pose import Array
 
 # Weights depend on the estimate, which depends on the weights: so many rounds.
 ROUNDS = 4
@@ -297,41 +297,3 @@ def sticking_displacement(
     p, way = np.asarray(point, dtype=float), np.asarray(travel, dtype=float)
     k = _rotation_about(p)
     return np.array([*way, 0.0]) + turn * k, angle_sd**2 * np.outer(k, k)
-
-
-@dataclass(frozen=True)
-class FrictionBounds:
-    """What sticking and slipping have told of the coefficient between finger and object: low ≤ μ ≤ high."""
-
-    low: float = 0.0
-    high: float = float(np.inf)
-
-    def stuck(self, ratio: float, doubt: float = 0.0) -> "FrictionBounds":
-        """After sticking with |tangential| / normal force = ratio, known within a doubt: μ is at least that."""
-        return replace(self, low=max(self.low, min(abs(ratio) - doubt, self.high)))
-
-    def slipped(self, ratio: float, doubt: float = 0.0) -> "FrictionBounds":
-        """After slipping although the ratio asked for was no more than this: μ is at most that."""
-        return replace(self, high=min(self.high, max(abs(ratio) + doubt, self.low)))
-
-    def clip(self, believed: float) -> float:
-        """The believed μ, as far as the bounds allow it."""
-        return float(min(max(believed, self.low), self.high))
-
-
-def probing_velocity(normal: ArrayLike, travelled: float, speed: float, swing: float, angle: float) -> Array:
-    """Velocity (2,) of a finger that probes: along the inward normal, swung to its left and right in turn.
-
-    Two motions of different curvature determine b (b = Y_1 × Y_2); the swing starts with half a stretch, so that the
-    object weaves about its way.
-
-    Args:
-        normal: inward, shape (2,).
-        travelled: so far [m].
-        speed: [m/s].
-        swing: length of one stretch [m].
-        angle: of the swing [rad]; within the friction cone the contact sticks.
-    """
-    n = np.asarray(normal, dtype=float)
-    side = 1.0 if int((travelled + 0.5 * swing) // swing) % 2 == 0 else -1.0
-    return rotate(side * angle, speed * n / float(np.hypot(*n)))

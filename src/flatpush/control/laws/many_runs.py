@@ -1,6 +1,6 @@
 """Many closed-loop runs of one push at once, compiled: a point finger on an ellipsoidal limit surface.
 
-For other surfaces, round fingers and cameras that are late, see control.closed_loop.
+For other surfaces, round fingers and cameras that are late, see control.loop.closed_loop.
 """
 
 import os
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ..gains import HOLDS
-from ..linearisation import TrackingController
-from ..path_following import PathController
-from ..reference import PathReference
+from .gains import HOLDS
+from .linearisation import TrackingController
+from .path_following import PathController
+from .reference import PathReference
 
 OUTCOMES = ("out of time", "left the edge", "arrived")
 
@@ -70,7 +70,7 @@ def closed_loops(
     Raises:
         InputError: for shapes or numbers that make no sense.
     """
-    from .kernels import many
+    from .rollout_kernel import many
 
     model = controller.model
     dfl = isinstance(controller, TrackingController)

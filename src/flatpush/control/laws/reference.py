@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry import compose, cross, exp, perpendicular, relative, rotate, transform, velocity_at
-from ..geometry.pose import Array
-from ..planning.timing import Trapezoid
-from ..problem import Arc, Pusher, PushSegment
-from .laws.plain import place
+from ...errors import InputError
+from ...geometry import compose, cross, exp, perpendicular, relative, rotate, transform, velocity_at
+from ...geometry.pose import Array
+from ...planning.timing import Trapezoid
+from ...problem import Arc, Pusher, PushSegment
+from .formulas import place
 from .steering_model import SteeringModel
 
 # Below this share of its largest value a flat speed counts as none.
@@ -44,7 +44,7 @@ class PathReference(AbstractReference):
     """Arcs and lines, at a constant flat speed through the junctions (z is C¹ there, z̈ jumps) or with a time law.
 
     Attributes:
-        table: the path, shape (n, 6), see control.laws.plain.
+        table: the path, shape (n, 6), see control.laws.formulas.
         speed: of the flat point [m/s]; with a time law, its largest.
         laws: of the flat point in each piece, from rest to rest; none: the speed is constant.
     """

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry.pose import Array
-from ..simulation.plant import Plant
+from ...errors import InputError
+from ...geometry.pose import Array
+from ...simulation.plant import Plant
 from .controller import AbstractController
 from .sensor import AbstractSensor
 

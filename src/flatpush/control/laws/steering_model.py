@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry import cross, perpendicular, rotate, shift_twist, velocity_at
-from ..geometry.pose import Array
-from ..steering.car import Car
-from ..steering.flat import FlatOutput
-from .learning import SteeringEstimate
+from ...errors import InputError
+from ...geometry import cross, perpendicular, rotate, shift_twist, velocity_at
+from ...geometry.pose import Array
+from ...steering.car import Car
+from ...steering.flat import FlatOutput
+from ..learning.belief import SteeringEstimate
 
 # Turns per length at which the drift is computed, and halvings of the force's angle for each.
 _SAMPLES, _HALVINGS = 21, 40

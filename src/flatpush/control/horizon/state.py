@@ -5,19 +5,19 @@ from typing import Literal
 
 import numpy as np
 
-from ..geometry.pose import Array
+from ...geometry.pose import Array
+from ..learning.friction_bounds import FrictionBounds
+from ..loop.controller import ControllerState
+from ..loop.frames import Seen
+from ..loop.measurement import Measurement
 from .contact_car import ContactCar
-from .controller import ControllerState
-from .frames import Seen
-from .learning import FrictionBounds
-from .measurement import Measurement
-from .steering import Steering
+from .push_knowledge import Steering
 
 Phase = Literal["look", "transit", "push", "resume", "retreat"]
 
 
 @dataclass(frozen=True, eq=False)
-class Mark:
+class LearningWindow:
     """Where a stretch began that is to be learned from, and what has happened since.
 
     Attributes:
@@ -52,7 +52,7 @@ class HorizonState(ControllerState):
             allowed: it ends after this at the latest [m].
         landings, resumes: how many there were, of the latter in this push.
         failures: how often the finger slipped, or lost the edge too often, at every option.
-        steering: of every option. bounds: of the friction between finger and object. mark: see Mark.
+        steering: of every option. bounds: of the friction between finger and object. window: see LearningWindow.
     """
 
     phase: Phase = "look"
@@ -76,4 +76,4 @@ class HorizonState(ControllerState):
     failures: tuple[int, ...] = ()
     steering: tuple[Steering, ...] = ()
     bounds: FrictionBounds = field(default_factory=FrictionBounds)
-    mark: Mark | None = None
+    window: LearningWindow | None = None

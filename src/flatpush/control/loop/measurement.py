@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.pose import Array
+from ...geometry.pose import Array
 
 
 @dataclass(frozen=True, eq=False)

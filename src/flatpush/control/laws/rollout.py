@@ -1,4 +1,6 @@
-"""One closed-loop run with a point finger on an ellipsoidal limit surface, on plain numbers; kernels compiles this."""
+"""One closed-loop run with a point finger on an ellipsoidal limit surface, on plain numbers.
+
+laws.rollout_kernel compiles it."""
 
 import math
 from typing import Any
@@ -6,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.pose import Array
-from ..laws.plain import RAMP, along_path, linearised, nearest, place, point_velocity, wrapped
+from .formulas import RAMP, along_path, linearised, nearest, place, point_velocity, wrapped
 
 DFL, PATH = 0, 1
 STICKING, SLIDING_LEFT, SLIDING_RIGHT, SEPARATION = 1, 2, 3, 4

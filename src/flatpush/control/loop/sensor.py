@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..geometry.pose import Array
+from ...errors import InputError
+from ...geometry.pose import Array
 from .measurement import Measurement
 
 # A frame is taken when the clock is within this of its instant [s].

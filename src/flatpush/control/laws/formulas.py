@@ -1,4 +1,4 @@
-"""Feedback laws of a sticking push, on plain numbers; laws.kernels compiles these same functions.
+"""Feedback laws of a sticking push, on plain numbers; laws.formula_kernels compiles these same functions.
 
 A reference path is a table of shape (n, 6), one row for each piece of the flat point's path: arc length at its start
 [m], its length [m], the point (x, y) and the tangent's angle [rad] there, its curvature [1/m]. Heading φ: direction in
@@ -11,7 +11,7 @@ from typing import Any
 
 from ...geometry.pose import Array
 
-# How a command is held over a tick, see linearisation.Hold.
+# How a command is held over a tick, see laws.gains.Hold.
 RAMP, BEFORE, AFTER = 0, 1, 2
 
 

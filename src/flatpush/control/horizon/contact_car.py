@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry import cross, perpendicular, rotate, shift_twist, velocity_at
-from ..geometry.pose import Array
-from ..steering.car import Car
-from .steering_model import SteeringModel
+from ...geometry import cross, perpendicular, rotate, shift_twist, velocity_at
+from ...geometry.pose import Array
+from ...steering.car import Car
+from ..laws.steering_model import SteeringModel
 
 # The contact has to lie so far from the centre of friction, by the tip's own size of it, to have an axle.
 _LEAST = 1e-9

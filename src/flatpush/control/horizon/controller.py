@@ -6,25 +6,25 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import FlatpushError, InputError
-from ..geometry import compose, pose_error, relative
-from ..geometry.pose import Array
-from ..planning import Planner
-from ..problem import Plan, Scene
+from ...errors import FlatpushError, InputError
+from ...geometry import compose, pose_error, relative
+from ...geometry.pose import Array
+from ...planning import Planner
+from ...problem import Plan, Scene
+from ..laws.formulas import RAMP, point_velocity, wrapped
+from ..learning.friction_bounds import FrictionBounds
+from ..loop.controller import ARRIVED, AbstractController
+from ..loop.frames import Seen, predicted, refusal, with_command
+from ..loop.measurement import STOP, Command, Measurement
 from .contact_car import ContactCar
-from .controller import ARRIVED, AbstractController
-from .frames import Seen, predicted, refusal, with_command
-from .horizon_state import HorizonState, Mark
+from .contact_observer import EDGE, LOST, ContactObserver, mean_pose, nearest_contact
 from .landings import next_push
-from .laws.plain import RAMP, point_velocity, wrapped
-from .learning import FrictionBounds
-from .measurement import STOP, Command, Measurement
+from .push_knowledge import Steering, shared, steering_of
 from .rest_of_path import rest_of_path
-from .steering import Steering, shared, steering_of
-from .watching import EDGE, LOST, Watch, mean_pose, touched
+from .state import HorizonState, LearningWindow
 
-# Plans leave this share of the friction cone, feedback may use more of it (watching.EDGE); both cover friction that is
-# a fifth less than believed.
+# Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
+# friction that is a fifth less than believed.
 RESERVE = 0.4
 # Frames averaged over an object at rest.
 FRAMES = 10
@@ -132,9 +132,9 @@ class HorizonController(AbstractController[HorizonState]):
         return cls(planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits)
 
     @cached_property
-    def watch(self) -> Watch:
+    def observer(self) -> ContactObserver:
         """What makes sense of the frames."""
-        return Watch(self.scene, self.sd)
+        return ContactObserver(self.scene, self.sd)
 
     @property
     def _switching(self) -> float:
@@ -160,7 +160,7 @@ class HorizonController(AbstractController[HorizonState]):
             state = replace(state, newest=measurement)
             # At a landing all is known as of then; what was exposed before and comes late is no news.
             if state.seen.frame is None or measurement.time > state.seen.frame.time:
-                state = self.watch.seen(replace(state, expected=None), measurement)
+                state = self.observer.seen(replace(state, expected=None), measurement)
         frame = state.newest
         if frame is None:
             return self._stopped(state, time, "waiting", "no measurement yet")
@@ -196,10 +196,12 @@ class HorizonController(AbstractController[HorizonState]):
             return state, np.zeros(3)
         pose = mean_pose(state.frames)
         pose[2] = wrapped(float(pose[2]))
-        if state.mark is not None and state.mark.hand is not None:
+        if state.window is not None and state.window.hand is not None:
             sd = self.sd / math.sqrt(len(state.frames))
-            state = self.watch.learned(state, state.mark, pose, sd, relative(pose, state.mark.hand)[:2])
-            state = replace(state, mark=None)
+            state = self.observer.learned(
+                state, state.window, pose, sd, relative(pose, state.window.hand)[:2]
+            )
+            state = replace(state, window=None)
         if self.learn:
             state = replace(state, steering=shared(state.steering))
         error = pose_error(pose, self.scene.goal)
@@ -246,7 +248,7 @@ class HorizonController(AbstractController[HorizonState]):
             allowed=length + car.radius,
             landings=state.landings + 1,
             resumes=0,
-            mark=None,
+            window=None,
         )
         note = f"landing {state.landings} at {self.planner.usable[k].push.name}, {text}"
         return self._go(replace(state, note=note), time)
@@ -256,7 +258,11 @@ class HorizonController(AbstractController[HorizonState]):
         cars: list[ContactCar | None] = []
         for k, option in enumerate(self.planner.usable):
             assert option.placement is not None
-            car = self.watch.car(state, k, option.placement.tips[0]) if state.failures[k] < FAILURES else None
+            car = (
+                self.observer.car(state, k, option.placement.tips[0])
+                if state.failures[k] < FAILURES
+                else None
+            )
             cars.append(car if car is not None and car.leeway >= LEEWAY else None)
         return cars
 
@@ -283,7 +289,8 @@ class HorizonController(AbstractController[HorizonState]):
         assert state.tip is not None
         if self.learn:
             state = replace(
-                state, mark=Mark(float(state.frames[0][2]), self.sd / math.sqrt(FRAMES), state.tip)
+                state,
+                window=LearningWindow(float(state.frames[0][2]), self.sd / math.sqrt(FRAMES), state.tip),
             )
         pushing = replace(state, expected=None, phase="push", way=(), height=0.0, seen=seen, frames=())
         return self._push(pushing, time)
@@ -302,7 +309,9 @@ class HorizonController(AbstractController[HorizonState]):
             if state.resumes >= RESUMES:
                 return self._retreat(self._failed(state), time, "the contact was lost too often")
             note = f"the finger is {1000 * gap:.1f} mm from the edge"
-            state = replace(state, phase="resume", resumes=state.resumes + 1, frames=(), mark=None, note=note)
+            state = replace(
+                state, phase="resume", resumes=state.resumes + 1, frames=(), window=None, note=note
+            )
             return self._resume(state, time)
         m, dt = car.model, 1 / self.rate
         pose = self._expected(state, time)
@@ -326,9 +335,9 @@ class HorizonController(AbstractController[HorizonState]):
         u = point_velocity(flat[2], speed, omega, float(arm[0]), float(arm[1]), float(pose[2]), dt, RAMP)
         slow = min(1.0, self.scene.pusher.speed / max(math.hypot(*u), 1e-300))
         velocity = slow * np.array([u[0], u[1], omega if m.turns else 0.0])
-        mark = state.mark
-        if mark is not None:
-            mark = replace(mark, ratios=(*mark.ratios, car.ratio(rest.curvature)))
+        window = state.window
+        if window is not None:
+            window = replace(window, ratios=(*window.ratios, car.ratio(rest.curvature)))
         step = slow * speed * dt
         return replace(
             state,
@@ -336,7 +345,7 @@ class HorizonController(AbstractController[HorizonState]):
             note=rest.how,
             rest=rest.length - step,
             allowed=state.allowed - step,
-            mark=mark,
+            window=window,
             expected=pose,
         ), velocity
 
@@ -361,12 +370,12 @@ class HorizonController(AbstractController[HorizonState]):
         pose = mean_pose(state.frames)
         hand = self.hand(state, time)
         tip = relative(pose, hand)[:2]
-        _, normal, distance = touched(self.scene.object.outline, tip)
+        _, normal, distance = nearest_contact(self.scene.object.outline, tip)
         gap = distance - self.scene.pusher.tip_radius
         if gap <= NEAR:
             seen = Seen(Measurement(time, pose, hand))
             state = replace(state, phase="push", tip=tip, gap=0.0, seen=seen, frames=(), expected=None)
-            return self._push(replace(state, car=self.watch.car(state, state.push, tip)), time)
+            return self._push(replace(state, car=self.observer.car(state, state.push, tip)), time)
         speed = min(self.scene.pusher.speed, gap * self.rate)
         c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
         along = np.array([c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], 0.0])
@@ -377,15 +386,15 @@ class HorizonController(AbstractController[HorizonState]):
         assert state.tip is not None
         frame = state.seen.frame
         assert frame is not None
-        _, normal, _ = touched(self.scene.object.outline, state.tip)
+        _, normal, _ = nearest_contact(self.scene.object.outline, state.tip)
         angle = math.atan2(normal[1], normal[0]) + float(frame.object[2])
         hand, back = self.hand(state, time), self.scene.pusher.approach
         stop = np.array([hand[0] - back * math.cos(angle), hand[1] - back * math.sin(angle), hand[2], 0.0])
-        mark = state.mark
-        if mark is not None and state.car is not None:
+        window = state.window
+        if window is not None and state.car is not None:
             turned = float(predicted(state.seen, time, state.car.model)[2])
-            mark = replace(self.watch.along(state, mark, frame, hand, turned), hand=hand)
-        return self._go(replace(state, phase="retreat", way=(stop,), note=why, mark=mark), time)
+            window = replace(self.observer.along(state, window, frame, hand, turned), hand=hand)
+        return self._go(replace(state, phase="retreat", way=(stop,), note=why, window=window), time)
 
     def hand(self, state: HorizonState, time: float) -> Array:
         """X_WE now: where the newest frame's log has it, and the commands since."""

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..geometry import log, relative
-from .controller import AbstractController, ControllerState
-from .learning import SteeringBelief
-from .linearisation import TrackingController
-from .measurement import Command, Measurement
-from .path_following import PathController
-from .steering_model import SteeringModel
+from ...errors import InputError
+from ...geometry import log, relative
+from ..laws.linearisation import TrackingController
+from ..laws.path_following import PathController
+from ..laws.steering_model import SteeringModel
+from ..learning.belief import SteeringBelief
+from ..loop.controller import AbstractController, ControllerState
+from ..loop.measurement import Command, Measurement
 
 
 @dataclass(frozen=True, eq=False)

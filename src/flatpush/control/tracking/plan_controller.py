@@ -5,22 +5,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import InputError
-from ..geometry import compose, pose_error, relative
-from ..geometry.pose import Array
-from ..planning.options import push_option
-from ..problem import Plan
-from ..problem.mechanics import local_rho, named
-from .controller import ARRIVED, AbstractController, ControllerState
-from .frames import Seen, refusal
-from .gains import Gains
-from .learning import SteeringBelief
+from ...errors import InputError
+from ...geometry import compose, pose_error, relative
+from ...geometry.pose import Array
+from ...planning.options import push_option
+from ...problem import Plan
+from ...problem.mechanics import local_rho, named
+from ..laws.gains import Gains
+from ..laws.linearisation import TrackingController
+from ..laws.path_following import PathController
+from ..laws.reference import PathReference
+from ..laws.steering_model import SteeringModel
+from ..learning.belief import SteeringBelief
+from ..loop.controller import ARRIVED, AbstractController, ControllerState
+from ..loop.frames import Seen, refusal
+from ..loop.measurement import STOP, Command, Measurement
 from .learning_controller import LearningController
-from .linearisation import TrackingController
-from .measurement import STOP, Command, Measurement
-from .path_following import PathController
-from .reference import PathReference
-from .steering_model import SteeringModel
 
 # The prior of the centre of friction, by the object's size, and of ρ, by itself.
 SD_COF, SD_RHO = 0.03, 0.3
@@ -180,9 +180,3 @@ class PlanController(AbstractController[PlanState]):
         velocity = share * way / dt
         moved = replace(state, hand=state.hand + share * way, mode="transit", note="")
         return moved, Command(velocity, 0.0 if state.down else pusher.lift)
-
-
-def goal_error(plan: Plan, pose: Array) -> tuple[float, float]:
-    """Distance [m] and angle [rad] of a pose from the goal."""
-    error = pose_error(pose, plan.scene.goal)
-    return float(np.hypot(error[0], error[1])), abs(float(error[2]))

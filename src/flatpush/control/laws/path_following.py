@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
-from ..geometry.pose import Array
-from .controller import ARRIVED
+from ...errors import InputError
+from ...geometry.pose import Array
+from ..loop.controller import ARRIVED
+from ..loop.measurement import STOP, Command
+from .formulas import along_path, nearest, wrapped
 from .gains import limits
-from .laws.plain import along_path, nearest, wrapped
-from .measurement import STOP, Command
 from .push_controller import AbstractPushController, PushState, pusher_velocity
 from .reference import PathReference
 from .steering_model import SteeringModel

@@ -5,8 +5,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..steering.dubins import shortest_path
-from .laws.plain import wrapped
+from ...steering.dubins import shortest_path
+from ..laws.formulas import wrapped
 
 #: "even": two arcs, none tighter than with the reserve; "planned": a Dubins path with the reserve; "tight": one with
 #: the tightest turns that feedback may use; "closing": none leads there without a loop, and what is left of the errors

@@ -1,0 +1,91 @@
+"""A plan under feedback in the contact simulator, with a simulated camera: what `flatpush track` runs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from shapely import MultiPoint, Point
+
+from ...errors import InputError
+from ...geometry import compose, pose_error
+from ...problem import Plan
+from ...simulation.plant import Plant
+from ..horizon.controller import HorizonController
+from ..laws.gains import Gains
+from ..loop.closed_loop import ClosedLoopRun, drive
+from ..loop.controller import AbstractController, ControllerState
+from ..loop.sensor import Camera, SimulatedSensor
+from .plan_controller import PlanController
+
+Law = Literal["path", "dfl", "horizon"]
+Timing = Literal["even", "plan"]
+
+
+@dataclass(frozen=True)
+class TrackedRun:
+    """What is simulated: a controller of a plan, and in what the world differs from the plan.
+
+    Attributes:
+        controller: its name. rate: of its ticks [Hz]. timing, learn: see PlanController.of.
+        frequency: natural frequency [rad/s], and damping: ratio, of the law dfl.
+        camera: the simulated one.
+        friction: at the finger; None: the scene's.
+        centre: the centre of friction is off by this in O, (x, y) [m].
+        start: X_WO is off by this at the start [m, m, rad].
+        seed: of the camera's noise.
+    """
+
+    controller: Law = "path"
+    rate: float = 60.0
+    timing: Timing = "even"
+    learn: bool = False
+    frequency: float = 2.0
+    damping: float = 1.0
+    camera: Camera = field(default_factory=Camera)
+    friction: float | None = None
+    centre: tuple[float, float] = (0.0, 0.0)
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    seed: int = 0
+
+    def of(self, plan: Plan, told: Callable[[float, ControllerState], None] | None = None) -> ClosedLoopRun:
+        """Runs it; told is called at every tick with the time and the controller's state.
+
+        Raises:
+            InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
+        """
+        law = self._law(plan)
+        scene, first = plan.scene, plan.pushes[0]
+        if any(p.fingers.shape != first.fingers.shape for p in plan.pushes):
+            raise InputError("every push of a tracked plan has as many fingers as the first")
+        cof = scene.object.cof + np.array(self.centre)
+        if not MultiPoint(scene.object.outline.polyline()).convex_hull.covers(Point(cof)):
+            raise InputError("the centre of friction is off the object", key="centre", value=self.centre)
+        plant = Plant(scene.object, first.fingers, scene.pusher.tip_radius, friction=self.friction, cof=cof)
+        # The horizon controller looks, and lands again, as often as it takes.
+        patience = 3 * plan.duration + (200 if self.controller == "horizon" else 10)
+        # The pusher waits twice the approach distance behind the first contact, as planned.
+        hand = compose(first.pusher[0], [-2 * scene.pusher.approach, 0.0, 0.0])
+        sensor = SimulatedSensor(self.camera, np.random.default_rng(self.seed))
+        begin = scene.start_pose + np.array(self.start)
+        return drive(law, plant, begin, hand, sensor, patience, told=told)
+
+    def _law(self, plan: Plan) -> AbstractController:
+        if self.controller == "horizon":
+            return HorizonController.of(plan, rate=self.rate, latency=self.camera.latency, learn=self.learn)
+        return PlanController.of(
+            plan,
+            self.controller,
+            self.rate,
+            gains=Gains.of(self.frequency, self.damping),
+            timing=self.timing,
+            learn=self.learn,
+            sd=(max(self.camera.position, 1e-5), max(self.camera.angle, 1e-4)),
+            stale=0.5 + self.camera.latency,
+        )
+
+
+def goal_error(plan: Plan, pose: np.ndarray) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of a pose from the goal."""
+    error = pose_error(pose, plan.scene.goal)
+    return float(np.hypot(error[0], error[1])), abs(float(error[2]))
