@@ -30,18 +30,18 @@ SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 @nb.njit
-def poses_free(W, points, ball, poses):
+def poses_free(W, body, poses):
     count = 0
     for i in range(len(poses)):
-        count += pose_gap(W, points, ball, poses[i], 0.0, 0.0) >= 0.0
+        count += pose_gap(W, body, poses[i], 0.0, 0.0) >= 0.0
     return count
 
 
 @nb.njit
-def edges_free(W, points, ball, poses, steps):
+def edges_free(W, body, poses, steps):
     count = 0
     for i in range(len(poses)):
-        count += twist_gap(W, points, ball, poses[i], steps[i], 0.0, 0.0) >= 0.0
+        count += twist_gap(W, body, poses[i], steps[i], 0.0, 0.0) >= 0.0
     return count
 
 
@@ -65,7 +65,7 @@ def best_time(run: Callable[[], int]) -> tuple[float, int]:
 def checks() -> list[tuple[float, ...]]:
     """Rows: obstacles, µs a pose, µs an edge, free poses, free edges, kB."""
     body = Body.of(Outline.polygon(CORNERS), [(0.022167, 0.01375), (0.022167, -0.00425)], 0.0025)
-    points, ball = body.arrays
+    body = body.arrays
     rng = np.random.default_rng(0)
     poses = rng.uniform([0.06, 0.06, -np.pi], [0.94, 0.94, np.pi], (DRAWN, 3))
     turns = rng.choice([-1.0, 0.0, 1.0], DRAWN) * EDGE / 0.06
@@ -74,8 +74,8 @@ def checks() -> list[tuple[float, ...]]:
     rows = []
     for count in OBSTACLES:
         W = strewn(count).arrays
-        pose, free = best_time(lambda W=W: poses_free(W, points, ball, poses))
-        edge, clear = best_time(lambda W=W: edges_free(W, points, ball, poses, steps))
+        pose, free = best_time(lambda W=W: poses_free(W, body, poses))
+        edge, clear = best_time(lambda W=W: edges_free(W, body, poses, steps))
         size = sum(a.nbytes for a in W if isinstance(a, np.ndarray))
         rows.append((count, 1e6 * pose / DRAWN, 1e6 * edge / DRAWN, free / DRAWN, clear / DRAWN, size / 1e3))
     return rows
@@ -94,9 +94,9 @@ def poses() -> list[tuple[float, float, float]]:
         for size in POSES[:1] if warm else POSES:
             while lattice.size < size and not lattice.done:
                 began = time.thread_time()
-                lattice.advance(100)
+                lattice.advance(100, np.inf)
                 spent += time.thread_time() - began
-            arrays = lattice.nodes, lattice.links, lattice.table, lattice.key, lattice.heap
+            arrays = lattice.queue[:5]
             rows.append((lattice.size, spent, sum(a.nbytes for a in arrays) / 1e6))
     return rows[1:]
 

@@ -110,7 +110,7 @@ class Ompl:
         self.frame = np.array([*middle, np.arctan2(*fleet.direction[0][::-1])])
         back = inverse(self.frame).tolist()
         pose = np.empty(3)
-        checked = (asked.world.arrays, *asked.bodies[0].arrays)
+        checked = asked.world.arrays, asked.bodies[0].arrays
         need = asked.clearance
         self.count, self.spent = 0, 0.0
 

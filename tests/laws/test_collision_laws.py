@@ -87,7 +87,8 @@ def test_a_pose_has_the_clearance_that_shapely_measures(seed: int) -> None:
 def test_a_path_has_the_least_clearance_of_dense_samples(obstacles: int, seed: int) -> None:
     """The exact least clearance is at most that of any sample and at most half a step's way below the least of them."""
     world, body, start, step = random_case(seed, obstacles)
-    far = body.arrays[1][3] + np.hypot(*body.arrays[1][1:3])
+    B = body.arrays
+    far = B.reach + np.hypot(B.x, B.y)
     way = np.hypot(*step[:2]) + abs(step[2]) * far
     n = int(np.ceil(way / STEP)) + 1
     samples = [compose(start, exp(t * step)) for t in np.linspace(0, 1, n + 1)]
@@ -107,10 +108,9 @@ def test_a_path_has_the_least_clearance_of_dense_samples(obstacles: int, seed: i
 @settings(max_examples=25, deadline=None)
 def test_the_compiled_clearance_is_the_plain_one(seed: int) -> None:
     world, body, start, step = random_case(seed, 5 if seed % 2 else 30)
-    points, ball = body.arrays
     if pose_clearance(world, body, start) < 0:
         return
-    found = twist_gap(world.arrays, points, ball, start, step, 1e3, -np.inf)
+    found = twist_gap(world.arrays, body.arrays, start, step, 1e3, -np.inf)
     expected, _, _ = twist_clearance(world, body, start, step)
     # Where shapes overlap on the way both are zero or less; how much less depends on which pairs are looked at.
     if max(found, expected) > ROUNDING:

@@ -9,11 +9,12 @@ import pytest
 
 import flatpush as fp
 from flatpush.geometry import Outline
-from flatpush.geometry.collision import Body, World, path_clearance
-from flatpush.planning.obstacles import Search, Way
+from flatpush.geometry.collision import Body, World, path_clearance, pose_clearance
+from flatpush.planning.obstacles import Search
 from flatpush.planning.obstacles.lattice import Lattice, Level, Reach
 from flatpush.planning.obstacles.polish import Chain
 from flatpush.planning.obstacles.trees import Trees
+from flatpush.planning.path import Path
 from flatpush.steering.three_twist import words
 
 from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, stored_task
@@ -35,16 +36,14 @@ def searched(task, seed, work):
 
 
 def test_compiled_words_are_those_of_three_twist(task):
-    from flatpush.planning.obstacles.kernels import COLUMNS, WORDS
-    from flatpush.planning.obstacles.kernels import words as compiled
+    from flatpush.planning.obstacles.kernels import COLUMNS, WORDS, words_between
 
     rng = np.random.default_rng(0)
     out, fleet = np.empty((WORDS, COLUMNS)), task.fleet
-    _, _, _, _, _, _, cars, laws, *_ = task.arrays
     for _ in range(60):
         a = int(rng.integers(fleet.size))
         start, goal = rng.uniform(-0.2, 0.2, 3) * [1, 1, 10], rng.uniform(-0.2, 0.2, 3) * [1, 1, 10]
-        count = compiled(cars[a], laws[a], start, goal, out)
+        count = words_between(task.arrays, a, start, goal, out)
         plain = words(fleet.left[a], fleet.right[a], fleet.direction[a], start, goal)
         costs = sorted(
             sum(fleet.rates[a, "LSR".index(x)] * p for x, p in zip(w.word, w.parameters, strict=True))
@@ -54,77 +53,77 @@ def test_compiled_words_are_those_of_three_twist(task):
         assert np.allclose(out[:count, 0], costs, atol=1e-9)
         for row in out[:count]:
             pieces = [(a, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)]
-            end = Way.of(fleet, start, pieces).poses[-1]
+            end = Path.of(fleet, start, pieces).poses[-1]
             assert np.allclose(end[:2], goal[:2], atol=1e-9)
             assert np.allclose(np.exp(1j * end[2]), np.exp(1j * goal[2]), atol=1e-9)
 
 
 def test_compiled_edges_keep_clear_where_their_displacements_do(task):
-    from flatpush.planning.obstacles.kernels import COLUMNS, free, keeps
+    from flatpush.planning.obstacles.kernels import COLUMNS, word_clear
 
     rng = np.random.default_rng(1)
-    T, fleet, row, here = task.arrays, task.fleet, np.zeros(COLUMNS), np.empty(3)
+    T, fleet, row = task.arrays, task.fleet, np.zeros(COLUMNS)
     decided = {True: 0, False: 0}
     while sum(decided.values()) < 300:
         a = int(rng.integers(fleet.size))
         start = rng.uniform([0, 0, -3], [0.32, 0.25, 3])
-        if not free(T, a, start):
+        if pose_clearance(task.world, task.bodies[a], start) < task.clearance:
             continue
         row[1::2], row[2::2] = rng.integers(0, 3, 3), rng.uniform(0.0, 0.08, 3)
         row[2::2] *= np.where(row[1::2] == 1, 0.5, 6.0)
-        way = Way.of(fleet, start, [(a, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)])
+        way = Path.of(fleet, start, [(a, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)])
         steps = [way.step(*piece) for piece in way.pieces]
         gap = path_clearance(task.world, task.bodies[a], start, steps).distance
-        decided[bool(keeps(T, a, start, row, here))] += 1
-        assert keeps(T, a, start, row, here) == (gap >= task.clearance)
+        decided[bool(word_clear(T, a, start, row))] += 1
+        assert word_clear(T, a, start, row) == (gap >= task.clearance)
     assert min(decided.values()) > 20
 
 
 def test_a_lattice_finds_the_maze_at_once_and_its_way_is_free(task):
     lattice = Lattice(task, Reach(task), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
     while not lattice.done:
-        lattice.advance(100)
-    assert lattice.way.cost == pytest.approx(lattice.best[0])
-    assert lattice.way.cost < 0.8
-    check_way(task, lattice.way)
+        lattice.advance(100, np.inf)
+    assert lattice.path.cost == pytest.approx(lattice.queue.best[0])
+    assert lattice.path.cost < 0.8
+    check_way(task, lattice.path)
 
 
 def test_backwards_is_the_same_way(task):
     back = task.reversed
     lattice = Lattice(back, Reach(back), Level(0.015, 24, 0.02), np.inf, np.random.default_rng(0))
-    while lattice.best[1] < 0:
-        lattice.advance(200)
-    way = lattice.way.backwards(task.fleet, task.start)
-    assert way.cost == pytest.approx(lattice.way.cost)
+    while lattice.queue.best[1] < 0:
+        lattice.advance(200, np.inf)
+    way = lattice.path.backwards(task.fleet, task.start)
+    assert way.cost == pytest.approx(lattice.path.cost)
     check_way(task, way)
 
 
 def test_polish_shortens_and_stays_free(task):
     lattice = Lattice(task, Reach(task), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
     while not lattice.done:
-        lattice.advance(100)
-    chain = Chain(task, lattice.way, 3)
-    assert chain.cost <= lattice.way.cost + 1e-12
+        lattice.advance(100, np.inf)
+    chain = Chain(task, lattice.path, 3)
+    assert chain.cost <= lattice.path.cost + 1e-12
     for _ in range(5):
         chain.improve(500)
-        check_way(task, chain.way)
-        assert chain.way.cost <= chain.cost + 1e-12
-    assert chain.cost < 0.98 * lattice.way.cost
+        check_way(task, chain.path)
+        assert chain.path.cost <= chain.cost + 1e-12
+    assert chain.cost < 0.98 * lattice.path.cost
 
 
 def test_random_trees_find_a_first_way(task):
     for seed in range(12):
         trees = Trees(task, seed)
-        if trees.way is not None:
-            check_way(task, trees.way)
+        if trees.path is not None:
+            check_way(task, trees.path)
     one, two = Trees(task, 7), Trees(task, 7)
-    assert one.way is not None
-    assert one.way.pieces == two.way.pieces
+    assert one.path is not None
+    assert one.path.pieces == two.path.pieces
     # Where a word leads straight to the goal, it is found without any tree.
-    near = replace(task, goal=Way.of(task.fleet, task.start, [(1, 1, 0.01), (1, 0, 0.2)]).poses[-1])
+    near = replace(task, goal=Path.of(task.fleet, task.start, [(1, 1, 0.01), (1, 0, 0.2)]).poses[-1])
     assert Trees(near, 0, 3).work <= 3
-    assert Trees(near, 0, 3).way is not None
-    assert Trees(task, 0, 3).way is None
+    assert Trees(near, 0, 3).path is not None
+    assert Trees(task, 0, 3).path is None
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -263,7 +262,7 @@ def test_offered_ways_must_be_free(task):
     other = Search(task, 1)
     assert other.offer(search.best)
     assert other.cost <= search.cost
-    through = Way.of(task.fleet, task.start, [(1, 1, 0.3)])
+    through = Path.of(task.fleet, task.start, [(1, 1, 0.3)])
     assert not other.offer(through)
 
 
@@ -288,12 +287,12 @@ def test_round_objects_and_obstacles(data_folder):
     assert 0.05 <= least < 0.1
 
 
-def test_tidy_ways_have_fewer_pieces_and_cost_hardly_more(task):
-    from flatpush.planning.obstacles import tidied
+def test_pruned_paths_have_fewer_pieces_and_cost_hardly_more(task):
+    from flatpush.planning.obstacles import pruned
 
     fewer = 0
-    for way in (trees.way for trees in (Trees(task, seed) for seed in range(8)) if trees.way is not None):
-        tidy = tidied(task, way)
+    for way in (trees.path for trees in (Trees(task, seed) for seed in range(8)) if trees.path is not None):
+        tidy = pruned(task, way)
         check_way(task, tidy)
         gone = len(way.pieces) - len(tidy.pieces)
         assert gone >= 0
@@ -302,7 +301,7 @@ def test_tidy_ways_have_fewer_pieces_and_cost_hardly_more(task):
         fewer += gone
     assert fewer > 0
     # A needless wiggle on a straight way becomes the straight way again.
-    near = Way.of(
+    near = Path.of(
         task.fleet, task.start, [(1, 1, 0.01), (1, 0, 1e-3), (1, 2, 1e-3), (1, 0, 1e-3), (1, 1, 0.004)]
     )
-    assert len(tidied(task, near).pieces) <= 3
+    assert len(pruned(task, near).pieces) <= 3

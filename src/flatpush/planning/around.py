@@ -1,4 +1,4 @@
-"""Answers of the search among obstacles: each way is made a plan, checked as a whole, and only then given."""
+"""Answers of the search among obstacles: each path is made a plan, checked as a whole, and only then given."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -13,14 +13,15 @@ from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Leg, Segments, assemble
-from .obstacles import Search, Way, careful, legs_of, obstructions, task_of, tidied, way_of
+from .obstacles import Search, careful, legs_of, obstructions, path_of, pruned, task_of
 from .options import PushOption
+from .path import Path
 from .segments import SAG
 from .transits import Transits
 
 # The search stops after this many expansions of poses or tries at a better path for each of the scene's iterations.
 WORK = 30
-BETTER = 0.003  # the part of its cost by which a way is better before it is worth checking
+BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
 FAR = 1.0  # clearances beyond it are not told apart [m]
 SAMPLES = 7  # points of an edge that is drawn
 Progress = Callable[[float, float, int], object]
@@ -55,7 +56,7 @@ class Around:
         """Cost, segments and what to tell of better and better plans; ends with the limits of the scene.
 
         Args:
-            unhindered: finds ways as if there were nothing in the way; asked where it may be so.
+            unhindered: finds ways as if there were nothing in the path; asked where it may be so.
         """
         self.complaint = obstructions(self.scene, self.task, self.options)
         if self.complaint:
@@ -63,8 +64,8 @@ class Around:
         self.search.prepare()
         began = time.perf_counter()
         searched = self._rounds(began, self.search, unhindered)
-        for way in searched:
-            found = self._checked(way, began)
+        for path in searched:
+            found = self._checked(path, began)
             if found is not None:
                 yield found
             elif self.search.task is self.task:
@@ -73,29 +74,29 @@ class Around:
                 break
         else:
             return
-        for way in self._rounds(began, self.search, unhindered):
-            found = self._checked(way, began)
+        for path in self._rounds(began, self.search, unhindered):
+            found = self._checked(path, began)
             if found is not None:
                 yield found
 
     def _rounds(
         self, began: float, search: Search, unhindered: Callable[[], Iterator[Sequence[Leg]]]
-    ) -> Iterator[Way]:
+    ) -> Iterator[Path]:
         """Ways that are worth checking."""
         planning = self.scene.planning
         asked, fresh = np.inf, True
-        for way in search.rounds():
+        for path in search.rounds():
             clock = time.perf_counter() - began
             if self.progress is not None:
                 self.progress(self.best, clock, search.nodes)
             done = search.work >= WORK * planning.iterations or clock > planning.time_limit
             worth = min(asked, self.best) * (1.0 if done else 1 - BETTER)
-            if way is not None and way.cost < worth:
-                asked = way.cost
-                yield way
+            if path is not None and path.cost < worth:
+                asked = path.cost
+                yield path
             if done:
                 return
-            if fresh and way is not None and search.direct:
+            if fresh and path is not None and search.direct:
                 fresh = False
                 if self._free(search, unhindered):
                     if search.best is not None and search.cost < min(asked, self.best):
@@ -106,19 +107,19 @@ class Around:
         """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
         clear = False
         for done, legs in enumerate(unhindered()):
-            clear = search.offer(way_of(legs, self.options, self.task))
+            clear = search.offer(path_of(legs, self.options, self.task))
             if done > 0 and not clear:
                 return False
         return clear
 
-    def _checked(self, way: Way, began: float) -> tuple[float, Segments, dict[str, Any]] | None:
-        """The plan of a way, if it is one as a whole, with the pusher's transits."""
+    def _checked(self, path: Path, began: float) -> tuple[float, Segments, dict[str, Any]] | None:
+        """The plan of a path, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.planning.clearance
-        tidy = tidied(self.task, way)
+        shorter = pruned(self.task, path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
-        way = tidy if tidy.cost < self.best else way
+        path = shorter if shorter.cost < self.best else path
         try:
-            segments = assemble(scene, self.transits, legs_of(way, self.options))
+            segments = assemble(scene, self.transits, legs_of(path, self.options))
         except FlatpushError as error:
             self.refused += 1
             self.complaint = f"{error}. "
@@ -130,10 +131,10 @@ class Around:
                 f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm). "
             )
             return None
-        self.best = way.cost
+        self.best = path.cost
         if self._first is None:
             self._first = time.perf_counter() - began
-        return way.cost, segments, {"first_path_time": self._first, "poses_searched": self.search.nodes}
+        return path.cost, segments, {"first_path_time": self._first, "poses_searched": self.search.nodes}
 
     @property
     def tried(self) -> str:
@@ -169,11 +170,11 @@ def hand_clearance(scene: Scene, world: World, segments: Segments) -> float:
     A lower bound: along the chords between samples, less what a turning hand may bow out from them. The object rests
     meanwhile, and its own clearance belongs to the pushes.
     """
-    from ..geometry.collision.kernels import line_gap, pose_gap
+    from ..geometry.collision.kernels import pose_gap, twist_gap
 
     radius, bounds = scene.pusher.tip_radius, world.bounds
     tip = Body.of(Outline.circle(max(radius, 1e-9)))
-    best = np.inf
+    arrays, best = world.arrays, np.inf
     for i, segment in enumerate(segments):
         if not isinstance(segment, TransitSegment):
             continue
@@ -185,10 +186,10 @@ def hand_clearance(scene: Scene, world: World, segments: Segments) -> float:
             inside = min(np.min(points - bounds[:2]), np.min(bounds[2:] - points)) - radius
             best = min(best, float(inside) - bow)
             for k, m in _stretches(points, segment.height):
-                (x, y), (dx, dy) = points[k], points[m] - points[k]
-                gap = pose_gap(world.arrays, *tip.arrays, np.array([x, y, 0.0]), FAR, -np.inf)
+                at, (dx, dy) = np.array([*points[k], 0.0]), points[m] - points[k]
+                gap = pose_gap(arrays, tip.arrays, at, FAR, -np.inf)
                 if np.hypot(dx, dy) > 0:
-                    gap = min(gap, line_gap(world.arrays, *tip.arrays, x, y, 1.0, 0.0, dx, dy, FAR, -np.inf))
+                    gap = min(gap, twist_gap(arrays, tip.arrays, at, np.array([dx, dy, 0.0]), FAR, -np.inf))
                 best = min(best, float(gap) - bow)
     return best
 

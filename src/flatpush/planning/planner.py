@@ -23,7 +23,7 @@ from .assembly import Leg, Segments, assemble, car_of, costs, words_of
 from .candidates import automatic_pushes
 from .fleets import fleet_of
 from .freedom import Freedom, freedom
-from .obstacles import check_ends
+from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
 
@@ -110,7 +110,7 @@ class Planner:
         began = time.perf_counter()
         scene = self.scene if start is None else replace(self.scene, start=start)
         if _crowded(scene):
-            check_ends(scene)
+            check_endpoints(scene)
         if np.all(np.abs(pose_error(scene.start, scene.goal)) <= scene.planning.goal_tolerance):
             yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return

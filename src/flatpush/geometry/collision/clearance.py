@@ -40,9 +40,9 @@ def pose_clearance(world: World, body: Body, pose: ArrayLike, reach: float = np.
     """
     from .kernels import pose_gap
 
-    points, ball = body.arrays
-    X = np.asarray(pose, dtype=float)
-    return float(pose_gap(world.arrays, points, ball, X, _finite(world, reach), -np.inf))
+    return float(
+        pose_gap(world.arrays, body.arrays, np.array(pose, dtype=float), _finite(world, reach), -np.inf)
+    )
 
 
 def path_clearance(
@@ -67,15 +67,14 @@ def path_clearance(
     from .kernels import pose_gap, twist_gap
 
     far = _finite(world, reach)
-    points, ball = body.arrays
-    arrays = world.arrays
-    X, twists = np.array(start, dtype=float), np.asarray(steps, dtype=float).reshape(-1, 3)
-    best = float(pose_gap(arrays, points, ball, X, far, -np.inf))
+    arrays = world.arrays, body.arrays
+    X, twists = np.array(start, dtype=float), np.array(steps, dtype=float).reshape(-1, 3)
+    best = float(pose_gap(*arrays, X, far, -np.inf))
     at, from_pose = 0, X
     for i, step in enumerate(twists):
         if best < need or best == -np.inf:
             break
-        gap = float(twist_gap(arrays, points, ball, X, step, far, -np.inf))
+        gap = float(twist_gap(*arrays, X, step, far, -np.inf))
         if gap < best:
             best, at, from_pose = gap, i, X
         X = compose(X, exp(step))
@@ -90,5 +89,5 @@ def _finite(world: World, reach: float) -> float:
     """A finite reach: beyond it there is nothing."""
     if np.isfinite(reach):
         return reach
-    values = [1.0, *np.abs(world.features[:, :5]).ravel(), *np.abs(world.bounds[np.isfinite(world.bounds)])]
+    values = [1.0, *np.abs(world.boxes).ravel(), *np.abs(world.bounds[np.isfinite(world.bounds)])]
     return 1e3 * float(np.max(values))

@@ -89,15 +89,14 @@ def _overlaps(obstacle: Outline, body: Body, pose: Array) -> bool:
 
 def _pairs(world: World, body: Body, start: Array, step: Array) -> Iterator[tuple[float, float, int]]:
     """(distance, fraction, obstacle) of every pair of features."""
-    points, ball = body.arrays
+    points, corners, *_ = body.arrays
     turning = bool(step[2] != 0)
     centre = np.array([-step[1], step[0]]) / step[2] if turning else None
     Q = transform(start, centre) if centre is not None else None
     move: Array | float = float(step[2]) if turning else transform([0, 0, start[2]], step[:2])
     still = not turning and not np.any(step)
     back: Array | float = float(-step[2]) if turning else -step[:2]
-    corners = ball[0]
-    for x, y, r, _ in points:
+    for x, y, r, _ in points.tolist():
         p = transform(start, [x, y])
         xmin, ymin, xmax, ymax = world.bounds
         for bound, axis, sign in ((xmin, 0, 1), (ymin, 1, 1), (xmax, 0, -1), (ymax, 1, -1)):
@@ -113,15 +112,16 @@ def _pairs(world: World, body: Body, start: Array, step: Array) -> Iterator[tupl
                 value = transform(compose(start, exp(t * step)), [x, y])[axis]
                 yield sign * float(value - bound) - r, t, -1
     for f, row in enumerate(world.features):
-        segment, r, owner = row[:4].reshape(2, 2), row[4], int(world.owners[f])
-        for x, y, radius, _ in points if f < world.edges else points[corners:]:
+        segment = np.array([(row["ax"], row["ay"]), (row["bx"], row["by"])])
+        r, owner = float(row["radius"]), int(world.owners[f])
+        for x, y, radius, _ in (points if f < world.edges else points[corners:]).tolist():
             p = transform(start, [x, y])
             for t in [0.0] if still else arc_points(p, Q, move, segment):
                 q = transform(compose(start, exp(t * step)), [x, y])
                 yield _distance(q, segment) - radius - r, float(t), owner
         seen = transform(inverse(start), segment[0])
         for k in range(corners):
-            edge = points[[k, (k + 1) % corners], :2]
+            edge = body.outline.vertices[[k, (k + 1) % corners]]
             for t in [0.0] if still else arc_points(seen, centre, back, edge):
                 q = transform(relative(compose(start, exp(t * step)), np.zeros(3)), segment[0])
                 yield _distance(q, edge) - r, float(t), owner

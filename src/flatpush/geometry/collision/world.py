@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,57 @@ CELLS = 4.0  # cells of the grid per feature
 MOST_CELLS = 250_000
 # Where in its cell the reference point lies: not on a line that drawings are likely to have.
 REFERENCE = (0.5 + 0.0317811, 0.5 - 0.0291317)
+
+# An edge from a to b, or a circle about a = b with a radius [m]; 1/length² of the edge [1/m²], 0 of a circle.
+FEATURE = np.dtype([(name, "f8") for name in ("ax", "ay", "bx", "by", "radius", "inverse")], align=True)
+
+
+class Box(NamedTuple):
+    """A rectangle along the axes [m]."""
+
+    xmin: float
+    ymin: float
+    xmax: float
+    ymax: float
+
+
+class Grid(NamedTuple):
+    """Square cells over all features.
+
+    Attributes:
+        x, y: lower left corner [m]; per_metre: cells per metre; columns, rows: how many.
+        u, v: place of a cell's reference point in it, 0 to 1.
+    """
+
+    x: float
+    y: float
+    per_metre: float
+    columns: int
+    rows: int
+    u: float
+    v: float
+
+
+class WorldArrays(NamedTuple):
+    """A world as kernels see it.
+
+    Attributes:
+        features: of FEATURE; edges: how many of them, the first ones, are edges.
+        bounds: infinite where there is no side.
+        grid: over the features; items: the features of its cells, those of cell i at starts[i] to starts[i + 1].
+        winding: how often the polygons go around each cell's reference point.
+        stamps, near: scratch: when each feature was last looked at, with a counter at the end; what is near.
+    """
+
+    features: np.ndarray
+    edges: int
+    bounds: Box
+    grid: Grid
+    starts: np.ndarray
+    items: np.ndarray
+    winding: np.ndarray
+    stamps: np.ndarray
+    near: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +93,8 @@ class World:
         return not self.obstacles and not np.any(np.isfinite(self.bounds))
 
     @cached_property
-    def features(self) -> Array:
-        """Edges of polygons, counter-clockwise, then circles; rows (ax, ay, bx, by, r, 1/length²), shape (n, 6)."""
+    def features(self) -> np.ndarray:
+        """Edges of polygons, counter-clockwise, then circles, of FEATURE, shape (n,)."""
         rows = []
         for o in self.obstacles:
             if not o.is_circle:
@@ -52,7 +103,16 @@ class World:
                 inverse = 1.0 / np.sum((ends - corners) ** 2, axis=1)
                 rows.append(np.column_stack([corners, ends, np.zeros(len(corners)), inverse]))
         rows += [np.array([[*o.centre, *o.centre, o.radius, 0.0]]) for o in self.obstacles if o.is_circle]
-        return np.concatenate(rows) if rows else np.zeros((0, 6))
+        table = np.concatenate(rows) if rows else np.zeros((0, 6))
+        return np.ascontiguousarray(table).view(FEATURE).reshape(-1)
+
+    @cached_property
+    def boxes(self) -> tuple[Array, Array]:
+        """Lower and upper corners of a box about each feature, both of shape (n, 2) [m]."""
+        F = self.features
+        a, b = np.column_stack([F["ax"], F["ay"]]), np.column_stack([F["bx"], F["by"]])
+        r = F["radius"][:, None]
+        return np.minimum(a, b) - r, np.maximum(a, b) + r
 
     @cached_property
     def owners(self) -> np.ndarray:
@@ -66,32 +126,26 @@ class World:
         return sum(len(o.vertices) for o in self.obstacles)
 
     @property
-    def arrays(self) -> tuple[Any, ...]:
-        """What the kernels take: features, edges, bounds, grid, its lists of features, winding numbers, stamps.
-
-        The grid is (x, y, cells per metre, columns, rows, place of a cell's reference point in it). The stamps are
-        scratch: one set for every thread.
-        """
-        grid, starts, items, winding = self._grid
-        stamps = np.zeros(len(self.features) + 1, dtype=np.int64)
-        return self.features, self.edges, self.bounds, grid, starts, items, winding, stamps
+    def arrays(self) -> "WorldArrays":
+        """What the kernels take; its scratch is one thread's."""
+        n = len(self.features)
+        scratch = np.zeros(n + 1, np.int64), np.zeros(n, np.int64)
+        return WorldArrays(self.features, self.edges, Box(*self.bounds.tolist()), *self._cells, *scratch)
 
     @cached_property
-    def _grid(self) -> tuple[Array, np.ndarray, np.ndarray, np.ndarray]:
+    def _cells(self) -> tuple["Grid", np.ndarray, np.ndarray, np.ndarray]:
+        """The grid, where the list of each cell begins, the lists, and winding numbers."""
         F = self.features
         if not len(F):
-            grid = np.array([0.0, 0.0, 1.0, 1.0, 1.0, *REFERENCE])
+            grid = Grid(0.0, 0.0, 1.0, 1, 1, *REFERENCE)
             return grid, np.zeros(2, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64)
-        r = F[:, 4:5]
-        low = np.minimum(F[:, :2], F[:, 2:4]) - r
-        high = np.maximum(F[:, :2], F[:, 2:4]) + r
+        low, high = self.boxes
         corner, size = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
         cells = min(CELLS * len(F) + 16, MOST_CELLS)
         cell = float(np.sqrt(np.prod(size + 1e-3 * size.max()) / cells)) + 1e-12
         corner = corner - 1e-3 * cell
         nx, ny = (int(n) + 1 for n in (size + 2e-3 * cell) / cell)
-        per = 1.0 / cell
-        grid = np.array([*corner, per, nx, ny, *REFERENCE])
+        grid = Grid(float(corner[0]), float(corner[1]), 1.0 / cell, nx, ny, *REFERENCE)
         pairs = _cells_of(F, self.edges, corner, cell, nx, ny)
         order = np.argsort(pairs[:, 0], kind="stable")
         pairs = pairs[order]
@@ -102,11 +156,11 @@ class World:
         return grid, starts.astype(np.int64), pairs[:, 1].copy(), _winding(F[: self.edges], reference, nx, ny)
 
 
-def _cells_of(F: Array, edges: int, corner: Array, cell: float, nx: int, ny: int) -> np.ndarray:
+def _cells_of(F: np.ndarray, edges: int, corner: Array, cell: float, nx: int, ny: int) -> np.ndarray:
     """Pairs (cell, feature) of all cells that a feature meets, with a little to spare, shape (n, 2)."""
     slack = 1e-6 * cell
     pairs = []
-    for f, (ax, ay, bx, by, r, _) in enumerate(F):
+    for f, (ax, ay, bx, by, r, _) in enumerate(F.tolist()):
         low = (np.minimum([ax, ay], [bx, by]) - r - slack - corner) / cell
         high = (np.maximum([ax, ay], [bx, by]) + r + slack - corner) / cell
         i = np.arange(max(0, int(low[0])), min(nx - 1, int(high[0])) + 1)
@@ -126,12 +180,12 @@ def _cells_of(F: Array, edges: int, corner: Array, cell: float, nx: int, ny: int
     return np.concatenate(pairs).astype(np.int64)
 
 
-def _winding(edges: Array, points: Array, nx: int, ny: int) -> np.ndarray:
+def _winding(edges: np.ndarray, points: Array, nx: int, ny: int) -> np.ndarray:
     """How often the polygons go around the reference points of the cells, shape (ny · nx,): counted along rows."""
     count = np.zeros((ny, nx + 1), dtype=np.int64)
     y = points.reshape(ny, nx, 2)[:, 0, 1]
     x = points.reshape(ny, nx, 2)[0, :, 0]
-    for ax, ay, bx, by, *_ in edges:
+    for ax, ay, bx, by, *_ in edges.tolist():
         rows = np.flatnonzero((ay > y) != (by > y))
         at = ax + (y[rows] - ay) * (bx - ax) / (by - ay) if len(rows) else np.zeros(0)
         # Points to the left of the crossing see it to their right.

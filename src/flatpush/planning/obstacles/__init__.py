@@ -1,26 +1,24 @@
-"""Plans among obstacles: a way at once, then better ones while there is time.
+"""Plans among obstacles: a path at once, then better ones while there is time.
 
-A lattice search over steps of all pushes, with exact words on to the goal from every pose, finds the first way; finer
+A lattice search over steps of all pushes, with exact words on to the goal from every pose, finds the first path; finer
 lattices find narrower ones, and what they find is made shorter by moves that keep it clear (lattice, polish, search).
 Whether a motion keeps the clearance is decided exactly, between its ends included (geometry.collision).
 """
 
-from .asked import careful, legs_of, obstructions, task_of, way_of
-from .ends import check_ends
-from .path import Way
+from .endpoints import check_endpoints
+from .prune import pruned
+from .scene_task import careful, legs_of, obstructions, path_of, task_of
 from .search import Search
 from .task import Task
-from .tidy import tidied
 
 __all__ = [
     "Search",
     "Task",
-    "Way",
     "careful",
-    "check_ends",
+    "check_endpoints",
     "legs_of",
     "obstructions",
+    "path_of",
+    "pruned",
     "task_of",
-    "tidied",
-    "way_of",
 ]

@@ -1,4 +1,4 @@
-"""An anytime search among obstacles: trees, then lattices from coarse to fine, and every way they find made better."""
+"""An anytime search among obstacles: trees, then lattices from coarse to fine, and every path they find made better."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,8 +9,8 @@ import numpy as np
 from ...geometry import compose, exp
 from ...geometry.collision import World
 from ...geometry.pose import Array
+from ..path import Path
 from .lattice import Lattice, Level, Reach
-from .path import Way
 from .polish import Chain
 from .task import Task
 from .trees import Trees
@@ -33,17 +33,17 @@ class Search:
     """One search, in rounds of some hundredths of a second; see rounds().
 
     Attributes:
-        best: the cheapest way so far, or None.
+        best: the cheapest path so far, or None.
         work: poses expanded and moves tried so far.
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
-        closed: whether there is provably no way: not even for a disc inside the object, of radius `disc` [m].
-        direct: whether such a disc is known to have a way that is hardly longer than the straight one.
+        closed: whether there is provably no path: not even for a disc inside the object, of radius `disc` [m].
+        direct: whether such a disc is known to have a path that is hardly longer than the straight one.
     """
 
     def __init__(self, task: Task, seed: int) -> None:
         self.task = task
-        self.best: Way | None = None
+        self.best: Path | None = None
         self.work = 0
         self.nodes = 0
         self.finest = np.inf
@@ -76,11 +76,11 @@ class Search:
     def cost(self) -> float:
         return np.inf if self.best is None else self.best.cost
 
-    def rounds(self) -> Iterator[Way | None]:
-        """The best way so far after every round; ends only where there is provably none.
+    def rounds(self) -> Iterator[Path | None]:
+        """The best path so far after every round; ends only where there is provably none.
 
         Two random trees come first, for where there is room. Then two families of lattices take turns, one whose
-        pushes change on the way and one of single pushes, which gets finer for the same work; each level is searched
+        pushes change on the path and one of single pushes, which gets finer for the same work; each level is searched
         from the start or from the goal, in turns. What they find is polished at once, and the best ways again and
         again.
         """
@@ -88,10 +88,10 @@ class Search:
             return
         trees = Trees(self.task, self._seed)
         self.work, self.nodes = trees.work, trees.size
-        if trees.way is not None:
-            self.best = trees.way
+        if trees.path is not None:
+            self.best = trees.path
             yield self.best
-            self._add(trees.way)
+            self._add(trees.path)
         yield self.best
         reaches = [Reach(self.task)]
         self.disc, self.closed, self.direct = reaches[0].radius, not reaches[0].open, reaches[0].direct
@@ -115,7 +115,7 @@ class Search:
                 turn += 1
                 yield self.best
 
-    def _levels(self, reaches: list[Reach], changing: bool) -> Iterator[Way | None]:
+    def _levels(self, reaches: list[Reach], changing: bool) -> Iterator[Path | None]:
         """Level after level, ever finer, in rounds: better ways where one is found.
 
         A level is searched from the start and from the goal, in turns; it ends where one of the two is through.
@@ -128,7 +128,7 @@ class Search:
             while not any(lattice.done or lattice.size > MOST for lattice in pair):
                 for back in (0, 1):
                     if len(pair) == back:
-                        # The way back is estimated only when it is needed: the first way often comes sooner.
+                        # The path back is estimated only when it is needed: the first path often comes sooner.
                         task = self.task.reversed if back else self.task
                         if len(reaches) == back:
                             reaches.append(Reach(task))
@@ -140,18 +140,17 @@ class Search:
                         break
             k += 1
 
-    def _advance(self, lattice: Lattice) -> Way | None:
-        seen, expanded = lattice.size, int(lattice.counts[2])
-        lattice.best[0] = min(lattice.best[0], self.cost * SLACK)
-        better = lattice.advance(1 + EXPANSIONS // self.task.fleet.size)
-        self.work += int(lattice.counts[2]) - expanded
+    def _advance(self, lattice: Lattice) -> Path | None:
+        seen, expanded = lattice.size, lattice.expanded
+        better = lattice.advance(1 + EXPANSIONS // self.task.fleet.size, self.cost * SLACK)
+        self.work += lattice.expanded - expanded
         self.nodes += lattice.size - seen
         if self._drawn is None or self._drawn.size < lattice.size <= DRAWN:
             self._drawn = lattice
-        return lattice.way if better else None
+        return lattice.path if better else None
 
-    def _add(self, way: Way) -> None:
-        chain = Chain(self.task, way, int(self._rng.integers(1 << 60)))
+    def _add(self, path: Path) -> None:
+        chain = Chain(self.task, path, int(self._rng.integers(1 << 60)))
         if chain.legs:
             chain.improve(MOVES)
             self.work += MOVES
@@ -172,33 +171,22 @@ class Search:
                 kept.append(chain)
         self.chains = kept[:CHAINS]
         if self.chains and self.chains[0].cost < self.cost * (1 - 1e-12):
-            way = self.chains[0].way
-            if way.cost < self.cost:
-                self.best = way
+            path = self.chains[0].path
+            if path.cost < self.cost:
+                self.best = path
 
-    def offer(self, way: Way) -> bool:
-        """Takes a way from elsewhere if it keeps the clearance."""
-        from .kernels import changes, free, piece_gap
+    def offer(self, path: Path) -> bool:
+        """Takes a path from elsewhere if it keeps the clearance."""
+        from .kernels import path_clear
 
-        T, need = self.task.arrays, self.task.clearance
-        if (
-            not way.pieces
-            or way.pieces[0][0] not in self.task.first
-            or way.pieces[-1][0] not in self.task.last
-        ):
+        if not path.pieces:
             return False
-        for i, ((push, letter, amount), pose) in enumerate(zip(way.pieces, way.poses, strict=False)):
-            before = way.pieces[max(0, i - 1)][0]
-            if before != push and not changes(T, before, push, pose):
-                return False
-            if (
-                not free(T, push, way.poses[i + 1])
-                or piece_gap(T, push, letter, amount, pose, need, need) < need
-            ):
-                return False
-        if way.cost < self.cost:
-            self.best = way
-        self._add(way)
+        pushes, letters, amounts = (np.array(column) for column in zip(*path.pieces, strict=True))
+        if not path_clear(self.task.arrays, path.start, pushes, letters, amounts):
+            return False
+        if path.cost < self.cost:
+            self.best = path
+        self._add(path)
         return True
 
     def edges(self) -> tuple[Array, Array]:
@@ -206,8 +194,8 @@ class Search:
         if self._drawn is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
         edges, starts = self._drawn.edges(DRAWN)
-        way = Way(self._drawn.task.fleet, self.task.start, ())
-        return np.array([way.step(int(a), int(letter), x) for a, letter, x, _ in edges]).reshape(
+        path = Path(self._drawn.task.fleet, self.task.start, ())
+        return np.array([path.step(int(a), int(letter), x) for a, letter, x, _ in edges]).reshape(
             -1, 3
         ), starts
 
@@ -216,7 +204,10 @@ def level_of(task: Task, reach: Reach, k: int, changing: bool) -> Level:
     """The k-th lattice: cells from a third of the object down, steps that leave a cell, turns that change its layer."""
     box = task.extent
     size = task.bodies[0].outline.size
-    largest = max(0.75 * float(np.sqrt(reach.radius * size)), float(np.sqrt(np.prod(box[2:] - box[:2]))) / 60)
+    largest = max(
+        0.75 * float(np.sqrt(reach.radius * size)),
+        float(np.sqrt((box.xmax - box.xmin) * (box.ymax - box.ymin))) / 60,
+    )
     cell = largest * FINER**k
     step = 1.5 * cell
     angles = int(np.clip(1.5 * 2 * np.pi * float(np.median(task.fleet.radius)) / step, *ANGLES))

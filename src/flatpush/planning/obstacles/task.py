@@ -3,13 +3,52 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from ...geometry.collision import Body, World
+from ...geometry.collision.world import Box, WorldArrays
 from ...geometry.pose import Array
 from ...steering.fleet import Fleet
+
+# A car in O: turning centres [m], unit vector straight on, turning radius of the flat point [m].
+CAR = np.dtype(
+    [(name, "f8") for name in ("left_x", "left_y", "right_x", "right_y", "ahead_x", "ahead_y", "radius")],
+    align=True,
+)
+# What one of its motions costs, see Fleet.
+LAW = np.dtype([(name, "f8") for name in ("rate", "speed", "acceleration")], align=True)
+# How many points are corners, and a circle around all points, in O [m].
+HULL = np.dtype([("corners", "i8"), ("x", "f8"), ("y", "f8"), ("reach", "f8")], align=True)
+
+
+class TaskArrays(NamedTuple):
+    """A task as kernels see it; the first axis is the push.
+
+    Attributes:
+        world: bounds and obstacles.
+        points, hulls: object and fingertips; tips, hands: the fingertips alone. Of POINT (k, n) and HULL (k,).
+        backs: where the fingertips land, from where they push, in O, shape (k, 2) [m].
+        cars, laws: of CAR, shape (k,), and of LAW, shape (k, 3): left, straight, right.
+        switching: cost of changing from one push to another, shape (k, k).
+        last: whether a push may end at the goal, shape (k,).
+        need, room, inside: Task.clearance, Task.room, Task.inside.
+    """
+
+    world: WorldArrays
+    points: np.ndarray
+    hulls: np.ndarray
+    tips: np.ndarray
+    hands: np.ndarray
+    backs: Array
+    cars: np.ndarray
+    laws: np.ndarray
+    switching: Array
+    last: np.ndarray
+    need: float
+    room: float
+    inside: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +59,8 @@ class Task:
         fleet: the cars and what their motions and changes cost.
         world: bounds and obstacles.
         bodies: object and fingertips of each push.
-        backs: where the fingertips land, from where they push, in O, shape (k, 2) [m]: their way onto the contact and
-            off it is clear too.
+        backs: where the fingertips land, from where they push, in O, shape (k, 2) [m]: what lies between the
+            contact and that place is clear too.
         start, goal: poses X_WO.
         clearance: that must be kept [m].
         room: clearance that a change of push needs [m]: what the hand takes to go around the object on the table, or
@@ -40,40 +79,41 @@ class Task:
     inside: bool = False
 
     @cached_property
-    def arrays(self) -> tuple[Any, ...]:
+    def arrays(self) -> TaskArrays:
         """What the kernels take."""
-        fleet = self.fleet
-        hands = [Body.of(body.outline, body.discs, body.radius).arrays for body in self.bodies]
-        most = max(len(points) for points, _ in hands)
-        corners = hands[0][1][0]
-        round_ = int(self.bodies[0].outline.is_circle)
-        points = np.stack([_padded(p, most) for p, _ in hands])
-        balls = np.array([ball for _, ball in hands], dtype=float)
-        tips = np.ascontiguousarray(points[:, corners + round_ :])
-        middle = tips[:, :, :2].mean(axis=1)
-        reach = np.max(np.linalg.norm(tips[:, :, :2] - middle[:, None], axis=2) + tips[:, :, 2], axis=1)
-        hulls = np.column_stack([np.zeros(len(tips)), middle, reach])
+        fleet, k = self.fleet, self.fleet.size
+        bodies = [body.arrays for body in self.bodies]
+        most = max(len(body.points) for body in bodies)
+        points = np.stack([_padded(body.points, most) for body in bodies])
+        tips = np.ascontiguousarray(points[:, bodies[0].corners + int(self.bodies[0].outline.is_circle) :])
+        places = np.stack([tips["x"], tips["y"]], axis=-1)
+        middle = places.mean(axis=1)
+        reach = np.max(np.linalg.norm(places - middle[:, None], axis=2) + tips["radius"], axis=1)
+        hulls = np.array([body[1:] for body in bodies], HULL)
+        hands = np.array([(0, *at, r) for at, r in zip(middle.tolist(), reach.tolist(), strict=True)], HULL)
         cars = np.ascontiguousarray(np.column_stack([fleet.left, fleet.right, fleet.direction, fleet.radius]))
         laws = np.ascontiguousarray(np.stack([fleet.rates, fleet.speeds, fleet.accelerations], axis=-1))
-        numbers = np.array([self.clearance, self.room, self.inside, *np.zeros(fleet.size)], dtype=float)
-        arrays = (
-            self.world.arrays, points, balls, tips, hulls, np.ascontiguousarray(self.backs), cars, laws,
-            np.ascontiguousarray(fleet.switching), numbers,
+        arrays = TaskArrays(
+            self.world.arrays, points, hulls, tips, hands, np.array(self.backs, dtype=float, order="C"),
+            cars.view(CAR)[:, 0], laws.view(LAW)[:, :, 0], np.array(fleet.switching, dtype=float, order="C"),
+            np.zeros(k, np.bool_), self.clearance, self.room, self.inside,
         )  # fmt: skip
-        from .kernels import free, lands
+        from .kernels import stands
 
-        numbers[3:] = [free(arrays, a, self.goal) and lands(arrays, a, self.goal) for a in range(fleet.size)]
+        arrays.last[:] = [stands(arrays, a, self.goal) for a in range(k)]
         return arrays
 
+    def __post_init__(self) -> None:
+        for name in ("start", "goal"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+
     @cached_property
-    def extent(self) -> Array:
-        """The bounds, or a box around everything with room to pass by, (xmin, ymin, xmax, ymax)."""
-        F = self.world.features
-        points = [self.start[:2], self.goal[:2], F[:, :2] - F[:, 4:5], F[:, 2:4] + F[:, 4:5]]
-        every = np.concatenate([np.atleast_2d(p) for p in points])
+    def extent(self) -> Box:
+        """The bounds, or a box around everything with room to pass by."""
+        every = np.concatenate([self.start[None, :2], self.goal[None, :2], *self.world.boxes])
         margin = 2 * self.bodies[0].outline.size + 3 * float(np.max(self.fleet.radius))
         box = np.concatenate([every.min(axis=0) - margin, every.max(axis=0) + margin])
-        return np.where(np.isfinite(self.world.bounds), self.world.bounds, box)
+        return Box(*np.where(np.isfinite(self.world.bounds), self.world.bounds, box).tolist())
 
     @cached_property
     def reversed(self) -> "Task":
@@ -94,16 +134,16 @@ class Task:
     @cached_property
     def first(self) -> list[int]:
         """The pushes that can begin: their fingers land at the start."""
-        from .kernels import free, lands
+        from .kernels import stands
 
-        T = self.arrays
-        return [a for a in range(self.fleet.size) if free(T, a, self.start) and lands(T, a, self.start)]
+        return [a for a in range(self.fleet.size) if stands(self.arrays, a, self.start)]
 
     @cached_property
     def last(self) -> list[int]:
         """The pushes that can end: their fingers leave at the goal."""
-        return [a for a, able in enumerate(self.arrays[9][3:].tolist()) if able]
+        return [a for a, able in enumerate(self.arrays.last.tolist()) if able]
 
 
-def _padded(points: Array, size: int) -> Array:
-    return np.concatenate([points, np.repeat(points[-1:], size - len(points), axis=0)])
+def _padded(points: np.ndarray, size: int) -> np.ndarray:
+    """The same with its last row repeated."""
+    return np.concatenate([points, np.repeat(points[-1:], size - len(points))])

@@ -1,44 +1,124 @@
 """The compiled search on a lattice; the package's docstring explains it."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
-from ....geometry.collision.kernels import pose_gap
+from ....compiled import inner, kernel
+from ....geometry.collision.body import POINT, BodyArrays
+from ....geometry.collision.kernels import still_gap
+from ....geometry.collision.world import Box, WorldArrays
 from ....geometry.pose import Array
-from ..kernels import COLUMNS, LAST, NEED, WORDS, changes, connect, drive, free, piece_gap
+from ..kernels import (
+    COLUMNS,
+    FULL_TURN,
+    LEFT,
+    RIGHT,
+    STRAIGHT,
+    WORDS,
+    changes,
+    connect,
+    copy,
+    drive,
+    free,
+    piece_clear,
+    put,
+)
+from ..kernels import COST as WORD_COST
+from ..task import TaskArrays
 
-TURN = 2 * math.pi
-inner = nb.njit(error_model="numpy")
-outer = nb.njit(cache=True, nogil=True, error_model="numpy")
-
-X, Y, THETA, COST, LETTER, AMOUNT = range(6)
+X, Y, THETA, COST, LETTER, AMOUNT = range(6)  # columns of the nodes
+PARENT, PUSH, PLACE = range(3)  # columns of the links: PLACE is in the table
+CODE, NODE = range(2)  # columns of the table
 MANY = 1 << 20  # most cells along a side
+SPENT, DONE, FULL = range(3)  # why an expansion stopped: the budget, nothing left, no room left
+EIGHT = 0.9239  # cos(π/8): a path along eight directions is at most 1/EIGHT times as long as the straight one
 
 
-@outer
+class Queue(NamedTuple):
+    """A tree of poses with what is still to be looked at.
+
+    Attributes:
+        nodes: rows X … AMOUNT; links: rows PARENT, PUSH, PLACE.
+        table: hash table of cells, rows (CODE, best NODE), empty at -1, its length a power of two.
+        keys, heap: of the priority queue; counts: nodes, entries of the queue, nodes expanded.
+        best: cost of the best path to the goal, its last node, its push; shot: its last word.
+    """
+
+    nodes: Array
+    links: np.ndarray
+    table: np.ndarray
+    keys: Array
+    heap: np.ndarray
+    counts: np.ndarray
+    best: Array
+    shot: Array
+
+
+class Steps(NamedTuple):
+    """The lattice.
+
+    Attributes:
+        x, y, theta: its corner and the angle of its first layer; cell [m]; angles: layers.
+        step: path of the flat point in a step [m]; tries: words that are tried straight to the goal.
+        changing: whether pushes may change.
+    """
+
+    x: float
+    y: float
+    theta: float
+    cell: float
+    angles: int
+    step: float
+    tries: int
+    changing: bool
+
+
+class Rest(NamedTuple):
+    """What a path still costs at least, by that of one point of the body.
+
+    Attributes:
+        far: distances to the goal over a grid's cells [m], shape (columns · rows,).
+        x, y, cell: of the grid [m]; columns, rows.
+        px, py: the point in O [m].
+        weight: of the estimate; per_metre: what a metre of the point's path costs at least; slack: of `far` [m].
+    """
+
+    far: Array
+    x: float
+    y: float
+    cell: float
+    columns: int
+    rows: int
+    px: float
+    py: float
+    weight: float
+    per_metre: float
+    slack: float
+
+
+@kernel()
 def distances(
-    W: Any, disc: Array, box: Array, cell: float, nx: int, ny: int, goal: Array, need: float
+    W: WorldArrays, radius: float, box: Box, cell: float, nx: int, ny: int, goal: Array, need: float
 ) -> Array:
-    """Ways of the middle of a disc to a goal among the obstacles over a grid's cells, at least, shape (nx · ny,) [m].
+    """Distances of the middle of a disc from a goal among the obstacles over a grid's cells, at least, (nx · ny,) [m].
 
-    Eight neighbours; what a way through cells can be longer than a straight one is taken off. Cells count as free
+    Eight neighbours; what a path through cells can be longer than a straight one is taken off. Cells count as free
     unless the disc, less half a cell's diagonal, overlaps something at their middle.
     """
     n = nx * ny
-    out = np.full(n, np.inf)
-    open_ = np.zeros(n, np.bool_)
-    P = np.array([[0.0, 0.0, max(disc[0] - 0.75 * cell, 0.0), 0.0]])
-    ball = (0, 0.0, 0.0, P[0, 2])
-    pose = np.zeros(3)
+    out, open_ = np.empty(n), np.empty(n, np.bool_)
+    points = np.zeros(1, POINT)
+    points[0].radius = max(radius - 0.75 * cell, 0.0)
+    disc = BodyArrays(points, 0, 0.0, 0.0, points[0].radius)
     for j in range(ny):
         for i in range(nx):
-            pose[0], pose[1] = box[0] + (i + 0.5) * cell, box[1] + (j + 0.5) * cell
-            open_[j * nx + i] = pose_gap(W, P, ball, pose, need, need) >= need
-    gi = min(max(int((goal[0] - box[0]) / cell), 0), nx - 1)
-    gj = min(max(int((goal[1] - box[1]) / cell), 0), ny - 1)
+            x, y = box.xmin + (i + 0.5) * cell, box.ymin + (j + 0.5) * cell
+            out[j * nx + i] = math.inf
+            open_[j * nx + i] = still_gap(W, disc, x, y, 1.0, 0.0, need, need) >= need
+    gi = min(max(int((goal[0] - box.xmin) / cell), 0), nx - 1)
+    gj = min(max(int((goal[1] - box.ymin) / cell), 0), ny - 1)
     heap_key, heap_at = np.empty(8 * n + 1), np.empty(8 * n + 1, np.int64)
     size = 1
     heap_key[0], heap_at[0] = 0.0, gj * nx + gi
@@ -64,11 +144,13 @@ def distances(
                     heap_key[size], heap_at[size] = new, to
                     size += 1
                     _up(heap_key, heap_at, size - 1)
-    return out * 0.9239  # the most by which eight directions are longer
+    for at in range(n):
+        out[at] *= EIGHT
+    return out
 
 
 @inner
-def _up(key: Array, at: Any, i: int) -> None:
+def _up(key: Array, at: np.ndarray, i: int) -> None:
     k, a = key[i], at[i]
     while i > 0 and key[(i - 1) // 2] > k:
         key[i], at[i] = key[(i - 1) // 2], at[(i - 1) // 2]
@@ -77,7 +159,7 @@ def _up(key: Array, at: Any, i: int) -> None:
 
 
 @inner
-def _down(key: Array, at: Any, size: int) -> None:
+def _down(key: Array, at: np.ndarray, size: int) -> None:
     """Moves the last item, at `size`, to the top and down."""
     k, a = key[size], at[size]
     i = 0
@@ -92,138 +174,127 @@ def _down(key: Array, at: Any, size: int) -> None:
     key[i], at[i] = k, a
 
 
-@outer
-def expand(
-    T: Any, origin: Array, grid: Any, nodes: Array, links: Any, table: Any, key: Array, heap: Any, counts: Any,
-    far: Array, around: Any, weights: Array, goal: Array, best: Array, shot: Array, budget: int,
-) -> int:  # fmt: skip
-    """Expands up to a number of nodes; returns why it stopped: 0 budget, 1 nothing left, 2 no room left.
-
-    Args:
-        origin: (x, y) of the lattice's corner, and the angle of its first layer.
-        grid: (cell [m], angles, step [m], words to try straight to the goal, whether pushes may change).
-        nodes: rows X … AMOUNT; links: rows (parent, push, place in the table).
-        table: hash table of cells, rows (cell, best node), empty at -1, its length a power of two.
-        key, heap: of the queue; counts: (nodes, queue, expanded).
-        far: ways to the goal of a point of the body, at least [m]; around: (x, y, cell, nx, ny, x, y in O).
-        weights: of the cost to go, what a metre of that point costs at least, what may be wrong with it [m].
-        best: (cost of the best way to the goal, its last node, its push); shot: its last word.
-    """
-    cell, angles, step, tries, changing = grid
-    k, need, size, queued = len(T[6]), T[9][NEED], counts[0], counts[1]
+@kernel()
+def expand(T: TaskArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, budget: int) -> int:
+    """Expands up to a number of nodes; returns why it stopped: SPENT, DONE or FULL."""
+    nodes, links, table, counts, best = queue.nodes, queue.links, queue.table, queue.counts, queue.best
+    keys, heap, cell, angles = queue.keys, queue.heap, steps.cell, steps.angles
+    k, size, queued = len(T.cars), counts[0], counts[1]
     pose, here, rows = np.empty(3), np.empty(3), np.empty((WORDS, COLUMNS))
-    status = 0
+    status = SPENT
     for _ in range(budget):
         if queued == 0:
-            status = 1
+            status = DONE
             break
         if size + 3 * k >= len(nodes) or 2 * (size + 3 * k) > len(table):
-            status = 2
+            status = FULL
             break
-        node, value = heap[0], key[0]
+        node, value = heap[0], keys[0]
         queued -= 1
-        _down(key, heap, queued)
-        a, g = links[node, 1], nodes[node, COST]
-        if table[links[node, 2], 1] != node or (weights[0] <= 1.0 and value >= best[0]):
+        _down(keys, heap, queued)
+        a, g = links[node, PUSH], nodes[node, COST]
+        if table[links[node, PLACE], NODE] != node or (rest.weight <= 1.0 and value >= best[0]):
             continue
         counts[2] += 1
         for b in range(k):
-            extra = T[8][a, b]
+            extra = T.switching[a, b]
             for j in range(3):
                 pose[j] = nodes[node, j]
-            if (b != a and not changing) or g + extra >= best[0]:
+            if (b != a and not steps.changing) or g + extra >= best[0]:
                 continue
             if b != a and not changes(T, a, b, pose):
                 continue
             # Straight to the goal.
-            if g + extra + _least(T, b, pose, goal) < best[0] and T[9][LAST + b] > 0.0:
-                found = connect(T, b, pose, goal, best[0] - g - extra, tries, rows, here)
+            if g + extra + _least(T, b, pose, goal) < best[0] and T.last[b]:
+                found = connect(T, b, pose, goal, best[0] - g - extra, steps.tries, rows, here)
                 if found >= 0:
-                    best[0], best[1], best[2] = g + extra + rows[found, 0], node, b
-                    for j in range(COLUMNS):
-                        shot[j] = rows[found, j]
+                    best[0], best[1], best[2] = g + extra + rows[found, WORD_COST], node, b
+                    copy(rows[found], queue.shot)
             for letter in range(3):
-                amount = step if letter == 1 else step / T[6][b, 6]
-                law = T[7][b, letter]
-                cost = g + extra + law[0] * amount
-                if law[1] != np.inf:
+                amount = steps.step if letter == STRAIGHT else steps.step / T.cars[b].radius
+                law = T.laws[b, letter]
+                cost = g + extra + law.rate * amount
+                if law.speed != np.inf:
                     # At full speed; what it takes to start and stop counts where the motion changes.
                     same = b == a and nodes[node, LETTER] == letter
-                    cost = g + extra + law[0] * amount / law[1] + (0.0 if same else law[1] / law[2])
+                    cost = (
+                        g
+                        + extra
+                        + law.rate * amount / law.speed
+                        + (0.0 if same else law.speed / law.acceleration)
+                    )
                 if cost >= best[0]:
                     continue
-                for j in range(3):
-                    here[j] = pose[j]
-                drive(T[6][b], letter, amount, here)
+                put(pose, here)
+                drive(T, b, letter, amount, here)
                 i, m = (
-                    np.int64(math.floor((here[0] - origin[0]) / cell)),
-                    np.int64(math.floor((here[1] - origin[1]) / cell)),
+                    np.int64(math.floor((here[0] - steps.x) / cell)),
+                    np.int64(math.floor((here[1] - steps.y) / cell)),
                 )
-                h = int(((here[2] - origin[2]) % TURN) / TURN * angles) % angles
+                h = int(((here[2] - steps.theta) % FULL_TURN) / FULL_TURN * angles) % angles
                 code = ((np.int64(b) * angles + h) * MANY + (m + MANY // 2)) * MANY + (i + MANY // 2)
                 at = _slot(table, code)
-                old = table[at, 1]
+                old = table[at, NODE]
                 if old >= 0 and nodes[old, COST] <= cost + 1e-12:
                     continue
-                rest = _rest(far, around, here, weights)
-                if cost + rest >= best[0]:
+                left = _rest(rest, here)
+                if cost + left >= best[0]:
                     continue
-                if not free(T, b, here) or piece_gap(T, b, letter, amount, pose, need, need) < need:
+                if not free(T, b, here) or not piece_clear(T, b, letter, amount, pose):
                     continue
                 for j in range(3):
                     nodes[size, j] = here[j]
                 nodes[size, COST], nodes[size, LETTER], nodes[size, AMOUNT] = cost, letter, amount
-                links[size, 0], links[size, 1], links[size, 2] = node, b, at
-                table[at, 0], table[at, 1] = code, size
-                key[queued], heap[queued] = cost + weights[0] * rest, size
+                links[size, PARENT], links[size, PUSH], links[size, PLACE] = node, b, at
+                table[at, CODE], table[at, NODE] = code, size
+                keys[queued], heap[queued] = cost + rest.weight * left, size
                 queued += 1
-                _up(key, heap, queued - 1)
+                _up(keys, heap, queued - 1)
                 size += 1
     counts[0], counts[1] = size, queued
     return status
 
 
-@outer
-def rehash(table: Any, links: Any, old: Any) -> None:
+@kernel()
+def rehash(table: np.ndarray, links: np.ndarray, old: np.ndarray) -> None:
     """Moves the cells of a full table to a larger one."""
     for i in range(len(old)):
-        if old[i, 1] >= 0:
-            at = _slot(table, old[i, 0])
-            table[at, 0], table[at, 1] = old[i, 0], old[i, 1]
-            links[old[i, 1], 2] = at
+        if old[i, NODE] >= 0:
+            at = _slot(table, old[i, CODE])
+            table[at, CODE], table[at, NODE] = old[i, CODE], old[i, NODE]
+            links[old[i, NODE], PLACE] = at
 
 
 @inner
-def _slot(table: Any, code: int) -> int:
+def _slot(table: np.ndarray, code: np.int64) -> int:
     """The place of a cell in the table: where it is, or where it would go."""
     mask = len(table) - 1
     mixed = code * np.int64(-7046029254386353131)
     at = (mixed ^ (mixed >> 29)) & mask
-    while table[at, 1] >= 0 and table[at, 0] != code:
+    while table[at, NODE] >= 0 and table[at, CODE] != code:
         at = (at + 1) & mask
     return int(at)
 
 
 @inner
-def _rest(far: Array, around: Any, pose: Array, weights: Array) -> float:
-    """What the way from a pose to the goal costs at least, by that of one point of the body."""
-    x0, y0, cell, nx, ny, px, py = around
+def _rest(rest: Rest, pose: Array) -> float:
+    """What the path from a pose to the goal costs at least, by that of one point of the body."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    u = int((pose[0] + c * px - s * py - x0) / cell)
-    v = int((pose[1] + s * px + c * py - y0) / cell)
-    u, v = min(max(u, 0), nx - 1), min(max(v, 0), ny - 1)
-    return max(0.0, far[v * nx + u] - weights[2]) * weights[1]
+    u = int((pose[0] + c * rest.px - s * rest.py - rest.x) / rest.cell)
+    v = int((pose[1] + s * rest.px + c * rest.py - rest.y) / rest.cell)
+    u, v = min(max(u, 0), rest.columns - 1), min(max(v, 0), rest.rows - 1)
+    return max(0.0, rest.far[v * rest.columns + u] - rest.slack) * rest.per_metre
 
 
 @inner
-def _least(T: Any, b: int, pose: Array, goal: Array) -> float:
-    """What push b costs at least from pose to goal: the way of the midpoint of its centres."""
-    car, law = T[6][b], T[7][b]
-    fx, fy = 0.5 * (car[0] + car[2]), 0.5 * (car[1] + car[3])
+def _least(T: TaskArrays, b: int, pose: Array, goal: Array) -> float:
+    """What push b costs at least from pose to goal: the path of the midpoint of its centres."""
+    car, law = T.cars[b], T.laws[b]
+    fx, fy = 0.5 * (car.left_x + car.right_x), 0.5 * (car.left_y + car.right_y)
     c, s, d, t = math.cos(pose[2]), math.sin(pose[2]), math.cos(goal[2]), math.sin(goal[2])
     x = goal[0] + d * fx - t * fy - pose[0] - c * fx + s * fy
     y = goal[1] + t * fx + d * fy - pose[1] - s * fx - c * fy
-    rate = min(law[1, 0], min(law[0, 0], law[2, 0]) / car[6])
-    if law[1, 1] != np.inf:
-        rate = rate / max(law[0, 1], max(law[1, 1], law[2, 1]))
+    rate = min(law[STRAIGHT].rate, min(law[LEFT].rate, law[RIGHT].rate) / car.radius)
+    if law[STRAIGHT].speed != np.inf:
+        rate = rate / max(law[LEFT].speed, max(law[STRAIGHT].speed, law[RIGHT].speed))
     return rate * math.sqrt(x * x + y * y)

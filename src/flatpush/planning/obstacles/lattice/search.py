@@ -1,16 +1,23 @@
 """One search on a lattice, in pieces, so that it can be watched and stopped."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ....geometry import transform
 from ....geometry.pose import Array
-from ..path import Way
+from ...path import COLUMNS, Path, pieces_of
 from ..task import Task
 
 DETOUR = 1.05
+GRID_CELLS = 6_000  # of the grid over which distances to the goal are known, at most
+TRIES = 3  # words from a pose straight to the goal
 ROOM = 1 << 14  # nodes there is room for at first
+
+
+if TYPE_CHECKING:
+    from .kernels import Rest
 
 
 @dataclass(frozen=True)
@@ -45,12 +52,12 @@ class Reach:
         self.point, self.radius = largest_disc(task)
         ends = np.array([transform(X, self.point) for X in (task.start, task.goal)])
         box = task.extent
-        cell = max(0.35 * self.radius, float(np.sqrt(np.prod(box[2:] - box[:2]) / 6_000)))
-        self.nx, self.ny = (int(n) + 1 for n in (box[2:] - box[:2]) / cell)
-        self.cell, self.corner = cell, box[:2].copy()
-        disc = np.array([self.radius])
+        size = np.array([box.xmax - box.xmin, box.ymax - box.ymin])
+        cell = max(0.35 * self.radius, float(np.sqrt(np.prod(size) / GRID_CELLS)))
+        self.nx, self.ny = (int(n) + 1 for n in size / cell)
+        self.cell, self.corner = cell, np.array(box[:2])
         self.far = distances(
-            task.world.arrays, disc, self.corner, cell, self.nx, self.ny, ends[1], task.clearance
+            task.world.arrays, self.radius, box, cell, self.nx, self.ny, ends[1], task.clearance
         )
         at = np.clip(((ends[0] - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
         way = float(self.far[at[1] * self.nx + at[0]])
@@ -64,13 +71,17 @@ class Reach:
             rates += [left / max(arms[0], 1e-12), straight, right / max(arms[1], 1e-12)]
         self.per_metre = float(min(rates))
 
-    @property
-    def around(self) -> tuple[float, float, float, int, int, float, float]:
-        return (*self.corner.tolist(), self.cell, self.nx, self.ny, *self.point.tolist())
+    def rest(self, weight: float) -> "Rest":
+        """The same as kernels see it."""
+        from .kernels import Rest
+
+        (x, y), (px, py) = self.corner.tolist(), self.point.tolist()
+        slack = 2.0 * self.cell
+        return Rest(self.far, x, y, self.cell, self.nx, self.ny, px, py, weight, self.per_metre, slack)
 
 
 class Lattice:
-    """A search on one level: advance() it until it is done; `way` is the best way to the goal so far.
+    """A search on one level: advance() it until it is done; `path` is the best path to the goal so far.
 
     Args:
         bound: only ways that cost less are of interest.
@@ -82,77 +93,87 @@ class Lattice:
         self, task: Task, reach: Reach, level: Level, bound: float, rng: np.random.Generator,
         pushes: list[int] | None = None,
     ) -> None:  # fmt: skip
-        self.task, self.reach, self.level = task, reach, level
-        self.nodes, self.links = np.empty((ROOM, 6)), np.empty((ROOM, 3), np.int64)
-        self.table = np.full((2 * ROOM, 2), -1, np.int64)
-        self.key, self.heap = np.empty(ROOM), np.empty(ROOM, np.int64)
-        self.counts = np.zeros(3, np.int64)
+        from .kernels import Queue, Steps
+
+        self.task = task
         shift = rng.uniform(0, 1, 3) * [level.cell, level.cell, 2 * np.pi / level.angles]
-        self.origin = np.array([*task.start[:2], task.start[2]]) - shift
-        self.best, self.shot = np.array([bound, -1.0, -1.0]), np.zeros(7)
+        x, y, theta = (task.start - shift).tolist()
+        self.steps = Steps(x, y, theta, level.cell, level.angles, level.step, TRIES, level.changing)
+        self.rest = reach.rest(level.weight)
+        self.queue = Queue(
+            np.empty((ROOM, 6)), np.empty((ROOM, 3), np.int64), np.full((2 * ROOM, 2), -1), np.empty(ROOM),
+            np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound, -1.0, -1.0]), np.zeros(COLUMNS),
+        )  # fmt: skip
         self.done = False
+        q = self.queue
         for a in task.first if pushes is None else pushes:
-            n = int(self.counts[0])
-            self.nodes[n] = [*task.start, 0.0, -1.0, 0.0]
-            self.links[n] = [-1, a, n]
+            n = self.size
+            q.nodes[n] = [*task.start, 0.0, -1.0, 0.0]
+            q.links[n] = [-1, a, n]
             # A root has a place of its own in the table, under a code that no cell has.
-            self.table[n] = [-2 - n, n]
-            self.key[n], self.heap[n] = 0.0, n
-            self.counts[:2] += 1
+            q.table[n] = [-2 - n, n]
+            q.keys[n], q.heap[n] = 0.0, n
+            q.counts[:2] += 1
 
     @property
     def size(self) -> int:
         """Poses of the tree."""
-        return int(self.counts[0])
+        return int(self.queue.counts[0])
 
-    def advance(self, budget: int) -> bool:
-        """Expands up to so many poses; True if a better way was found."""
-        from .kernels import expand
+    @property
+    def expanded(self) -> int:
+        """Poses that were expanded."""
+        return int(self.queue.counts[2])
 
-        level, before = self.level, self.best[0]
-        grid = (level.cell, level.angles, level.step, 3, level.changing)
-        weights = np.array([level.weight, self.reach.per_metre, 2.0 * self.reach.cell])
+    def advance(self, budget: int, bound: float) -> bool:
+        """Expands up to so many poses, for paths that cost less than a bound; True if a better one was found."""
+        from .kernels import DONE, FULL, expand
+
+        best = self.queue.best
+        best[0] = before = min(best[0], bound)
         left = budget
         while left > 0:
-            expanded = int(self.counts[2])
-            status = expand(
-                self.task.arrays, self.origin, grid, self.nodes, self.links, self.table, self.key, self.heap,
-                self.counts, self.reach.far, self.reach.around, weights, self.task.goal, self.best, self.shot, left,
-            )  # fmt: skip
-            if status == 2:
+            expanded = self.expanded
+            status = expand(self.task.arrays, self.queue, self.steps, self.rest, self.task.goal, left)
+            if status == FULL:
                 self._grow()
-                left -= int(self.counts[2]) - expanded
+                left -= self.expanded - expanded
                 continue
-            self.done = status == 1
+            self.done = status == DONE
             break
-        return bool(self.best[0] < before)
+        return bool(best[0] < before)
 
     def _grow(self) -> None:
         from .kernels import rehash
 
-        self.nodes = np.concatenate([self.nodes, np.empty_like(self.nodes)])
-        self.links = np.concatenate([self.links, np.empty_like(self.links)])
-        self.key = np.concatenate([self.key, np.empty_like(self.key)])
-        self.heap = np.concatenate([self.heap, np.empty_like(self.heap)])
-        old, self.table = self.table, np.full((2 * len(self.table), 2), -1, np.int64)
-        rehash(self.table, self.links, old)
+        q = self.queue
+        twice = {name: _doubled(getattr(q, name)) for name in ("nodes", "links", "keys", "heap")}
+        self.queue = q._replace(table=np.full((2 * len(q.table), 2), -1), **twice)
+        rehash(self.queue.table, self.queue.links, q.table)
 
     @property
-    def way(self) -> Way:
-        """The best way to the goal."""
-        node, pieces = int(self.best[1]), []
-        shot = [(int(self.best[2]), int(self.shot[1 + 2 * i]), float(self.shot[2 + 2 * i])) for i in range(3)]
-        while self.links[node, 0] >= 0:
-            pieces.append((int(self.links[node, 1]), int(self.nodes[node, 4]), float(self.nodes[node, 5])))
-            node = int(self.links[node, 0])
-        return Way.of(self.task.fleet, self.task.start, [*pieces[::-1], *shot])
+    def path(self) -> Path:
+        """The best path to the goal."""
+        q = self.queue
+        node, pieces = int(q.best[1]), []
+        while q.links[node, 0] >= 0:
+            letter, amount = q.nodes[node, 4:6].tolist()
+            pieces.append((int(q.links[node, 1]), int(letter), amount))
+            node = int(q.links[node, 0])
+        shot = pieces_of(int(q.best[2]), q.shot)
+        return Path.of(self.task.fleet, self.task.start, [*pieces[::-1], *shot])
 
     def edges(self, most: int) -> tuple[Array, Array]:
         """Some edges of the tree: (n, 4) rows (push, letter, amount, cost) and the poses (n, 3) where they begin."""
-        with_parent = np.flatnonzero(self.links[: self.size, 0] >= 0)
+        q = self.queue
+        with_parent = np.flatnonzero(q.links[: self.size, 0] >= 0)
         chosen = with_parent[:: max(1, -(-len(with_parent) // most))]
-        nodes, links = self.nodes[chosen], self.links[chosen]
-        return np.column_stack([links[:, 1], nodes[:, 4:6], nodes[:, 3]]), self.nodes[links[:, 0], :3]
+        nodes, links = q.nodes[chosen], q.links[chosen]
+        return np.column_stack([links[:, 1], nodes[:, 4:6], nodes[:, 3]]), q.nodes[links[:, 0], :3]
+
+
+def _doubled(array: np.ndarray) -> np.ndarray:
+    return np.concatenate([array, np.empty_like(array)])
 
 
 def largest_disc(task: Task) -> tuple[Array, float]:

@@ -1,8 +1,8 @@
-"""Two random trees that look for a first way."""
+"""Two random trees that look for a first path."""
 
 import numpy as np
 
-from ..path import Piece, Way
+from ...path import COLUMNS, Path, pieces_of
 from ..task import Task
 
 ROOM = 512  # nodes of each tree
@@ -17,12 +17,12 @@ class Trees:
         direct: whether one word from the start to the goal is tried before anything grows.
 
     Attributes:
-        way: the way that was found, or None; far from the cheapest.
+        path: the one that was found, or None; far from the cheapest.
         size: nodes of both trees; work: words that were looked at.
     """
 
     def __init__(self, task: Task, seed: int, budget: int = BUDGET, direct: bool = True) -> None:
-        from .kernels import COLUMNS, grow, straight
+        from .kernels import Forest, grow, straight
 
         k = task.fleet.size
         self._task = task
@@ -32,31 +32,26 @@ class Trees:
         self.size, self.work = 2, k
         push = int(straight(task.arrays, first, task.start, task.goal, link)) if direct else -1
         if push >= 0:
-            self.way: Way | None = Way.of(task.fleet, task.start, self._pieces(push, link))
+            self.path: Path | None = Path.of(task.fleet, task.start, pieces_of(push, link))
             return
-        self._poses, self._rows = np.empty((2, ROOM, 3)), np.zeros((2, ROOM, COLUMNS))
-        self._pushes, self._parents = np.full((2, ROOM), -1), np.full((2, ROOM), -1)
-        self._poses[:, 0] = task.start, task.goal
-        sizes, joint = np.ones(2, np.int64), np.full(3, -1)
-        left = grow(
-            task.arrays, task.extent, first, self._poses, self._pushes, self._parents, self._rows, sizes,
-            np.array([seed], dtype=np.uint64), joint, link, budget - k,
+        self._forest = Forest(
+            np.empty((2, ROOM, 3)), np.full((2, ROOM), -1), np.full((2, ROOM), -1), np.zeros((2, ROOM, COLUMNS)),
+            np.ones(2, np.int64), first,
         )  # fmt: skip
-        self.size, self.work = int(sizes.sum()), budget - max(int(left), 0)
-        self.way = None if left < 0 else self._way(joint, link)
+        self._forest.poses[:, 0] = task.start, task.goal
+        joint, state = np.full(3, -1), np.array([seed], dtype=np.uint64)
+        left = grow(task.arrays, task.extent, self._forest, state, joint, link, budget - k)
+        self.size, self.work = int(self._forest.sizes.sum()), budget - max(int(left), 0)
+        self.path = None if left < 0 else self._path(joint, link)
 
-    def _way(self, joint: np.ndarray, link: np.ndarray) -> Way:
-        pieces = self._pieces(int(joint[2]), link)
+    def _path(self, joint: np.ndarray, link: np.ndarray) -> Path:
+        pieces = pieces_of(int(joint[2]), link)
         node = int(joint[0])
         while node > 0:
-            pieces = self._pieces(int(self._pushes[0, node]), self._rows[0, node]) + pieces
-            node = int(self._parents[0, node])
+            pieces = pieces_of(int(self._forest.pushes[0, node]), self._forest.rows[0, node]) + pieces
+            node = int(self._forest.parents[0, node])
         node = int(joint[1])
         while node > 0:
-            pieces += self._pieces(int(self._pushes[1, node]), self._rows[1, node])
-            node = int(self._parents[1, node])
-        return Way.of(self._task.fleet, self._task.start, pieces)
-
-    @staticmethod
-    def _pieces(push: int, row: np.ndarray) -> list[Piece]:
-        return [(push, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)]
+            pieces += pieces_of(int(self._forest.pushes[1, node]), self._forest.rows[1, node])
+            node = int(self._forest.parents[1, node])
+        return Path.of(self._task.fleet, self._task.start, pieces)

@@ -1,4 +1,4 @@
-"""A path of several pushes, piece by piece."""
+"""A path of one or many pushes, piece by piece: what every strategy of the search gives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,16 +6,17 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry import compose, exp
-from ...geometry.pose import Array
-from ...steering.fleet import Fleet
+from ..geometry import compose, exp
+from ..geometry.pose import Array
+from ..steering.fleet import Fleet
 
 NOTHING = 1e-10  # an amount below this is nothing [rad, m]
+COLUMNS = 7  # of a row of a word: what it costs, then letter and amount of each of its three pieces
 Piece = tuple[int, int, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class Path:
     """From a start on, pieces of constant twist.
 
     Attributes:
@@ -29,7 +30,7 @@ class Way:
     pieces: tuple[Piece, ...]
 
     @classmethod
-    def of(cls, fleet: Fleet, start: Array, pieces: Sequence[Piece]) -> "Way":
+    def of(cls, fleet: Fleet, start: Array, pieces: Sequence[Piece]) -> "Path":
         """Leaves out what is nothing and joins equal neighbours."""
         kept: list[Piece] = []
         for push, letter, amount in pieces:
@@ -72,9 +73,9 @@ class Way:
             total += way / speed + speed / up if way * up >= speed**2 else 2 * np.sqrt(way / up)
         return float(total)
 
-    def backwards(self, fleet: Fleet, start: Array) -> "Way":
-        """The way of a reversed task (Task.reversed) as one of the task itself."""
-        return Way.of(
+    def backwards(self, fleet: Fleet, start: Array) -> "Path":
+        """The path of a reversed task (Task.reversed) as one of the task itself."""
+        return Path.of(
             fleet, start, [(push, 2 - letter, amount) for push, letter, amount in self.pieces[::-1]]
         )
 
@@ -96,3 +97,8 @@ class Way:
                 found.append((some[0][0], word, np.array([x for *_, x in some]), self.poses[i]))
                 begin = i
         return found
+
+
+def pieces_of(push: int, row: Array) -> list[Piece]:
+    """The pieces of a word of a push in a row of COLUMNS numbers."""
+    return [(push, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)]

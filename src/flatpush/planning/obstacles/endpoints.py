@@ -13,7 +13,7 @@ SIDES = ("left", "lower", "right", "upper")
 TOUCHING = 1e-9
 
 
-def check_ends(scene: Scene) -> None:
+def check_endpoints(scene: Scene) -> None:
     """Refuses a start or goal where the object is outside, in an obstacle, or nearer to either than is allowed.
 
     Raises:

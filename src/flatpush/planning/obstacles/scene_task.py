@@ -1,4 +1,4 @@
-"""The task of a scene, and the legs of a way."""
+"""The task of a scene, and the legs of a path."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,8 +11,8 @@ from ...problem import Scene
 from ...steering.fleet import Fleet
 from ..assembly import Leg
 from ..options import PushOption
+from ..path import Path
 from ..transits import LEAST_GAP
-from .path import Way
 from .task import Task
 
 # More than is asked for, since the judge's clearance is a lower bound, at most 10 µm below the true one [m].
@@ -37,32 +37,32 @@ def task_of(scene: Scene, options: Sequence[PushOption], fleet: Fleet) -> Task:
 
 def careful(scene: Scene, task: Task) -> Task:
     """The same with so much room about every change of push that the hand finds its way from any contact to any."""
-    hulls = task.arrays[4]
     if scene.pusher.transit == "lift":
         return replace(task, inside=True)
     gap = max(scene.planning.clearance, LEAST_GAP)
-    return replace(task, room=2.05 * float(np.max(hulls[:, 3])) + 2 * gap + scene.planning.clearance)
+    return replace(
+        task, room=2.05 * float(np.max(task.arrays.hands["reach"])) + 2 * gap + scene.planning.clearance
+    )
 
 
-def legs_of(way: Way, options: Sequence[PushOption]) -> list[Leg]:
-    """The pushes of a way; the last one leads to the way's end."""
-    return [Leg(options[push], word, amounts, end) for push, word, amounts, end in way.stretches]
+def legs_of(path: Path, options: Sequence[PushOption]) -> list[Leg]:
+    """The pushes of a path; the last one leads to its end."""
+    return [Leg(options[push], word, amounts, end) for push, word, amounts, end in path.stretches]
 
 
-def way_of(legs: Sequence[Leg], options: Sequence[PushOption], task: Task) -> Way:
-    """Legs as a way."""
+def path_of(legs: Sequence[Leg], options: Sequence[PushOption], task: Task) -> Path:
+    """Legs as a path."""
     pieces = [
         (options.index(leg.option), "LSR".index(letter), float(amount))
         for leg in legs
         for letter, amount in zip(leg.word, leg.amounts, strict=True)
     ]
-    return Way.of(task.fleet, task.start, pieces)
+    return Path.of(task.fleet, task.start, pieces)
 
 
 def obstructions(scene: Scene, task: Task, options: Sequence[PushOption]) -> str:
     """Why no push can begin at the start, or end at the goal; empty where some can."""
     from ...geometry.collision import pose_clearance
-    from .kernels import free
 
     need = scene.planning.clearance
     for name, pose, able in (("start", task.start, task.first), ("goal", task.goal, task.last)):
@@ -74,9 +74,8 @@ def obstructions(scene: Scene, task: Task, options: Sequence[PushOption]) -> str
             return f"at the {name} the object {has}, {1000 * need:.2f} mm are asked for. "
         reasons = []
         for a, option in enumerate(options):
-            what = (
-                "do not land clear of obstacles and bounds" if free(task.arrays, a, pose) else "have no room"
-            )
+            room = pose_clearance(task.world, task.bodies[a], pose)
+            what = "have no room" if room < task.clearance else "do not land clear of obstacles and bounds"
             reasons.append(f"{option.push.name}: its fingers {what}")
         verb = "begin" if name == "start" else "end"
         return f"no push can {verb} at the {name}. {' · '.join(reasons)}. "
