@@ -1,5 +1,7 @@
 """The car of a push."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,14 +61,23 @@ def test_every_curvature_has_its_twist_and_a_force_inside_the_cone():
             car.twist(1.01 / car.radius)
 
 
-def test_the_margin_moves_the_edges_towards_the_straight_force():
-    whole, shrunk = (Car.of(CONTACT, SQUARE, margin=m) for m in (0.0, 0.25))
-    left, straight, right = CONTACT.force_angles(whole.forces)
-    angles = CONTACT.force_angles(shrunk.forces)
-    assert angles[0] == pytest.approx(left + 0.25 * (straight - left))
-    assert angles[1] == pytest.approx(straight)
-    assert angles[2] == pytest.approx(right + 0.25 * (straight - right))
-    assert shrunk.radius > whole.radius
+def test_the_margin_is_kept_of_the_coefficient():
+    car = Car.of(CONTACT, SQUARE, margin=0.25)
+    angles = CONTACT.force_angles(car.forces)
+    assert np.tan(angles[[0, 2]]) == pytest.approx([0.75 * CONTACT.friction, -0.75 * CONTACT.friction])
+    assert angles[1] == pytest.approx(CONTACT.force_angles(Car.of(CONTACT, SQUARE).forces)[1])
+    # With so much less friction, and no margin, the car is the same.
+    less = Car.of(replace(CONTACT, friction=0.75 * CONTACT.friction), SQUARE)
+    assert car.left_centre == pytest.approx(less.left_centre)
+    assert car.right_centre == pytest.approx(less.right_centre)
+
+
+def test_a_push_that_cannot_keep_its_margin_says_what_it_could_keep():
+    """Its straight force takes 0.2 of 0.3: a third of μ is left."""
+    leaning = PointContact([0.004, -0.02], [0.0, 1.0], 0.3)
+    assert Car.of(leaning, SQUARE, margin=0.333).radius > 0
+    with pytest.raises(NoDubinsReduction, match=r"33\.3 % of μ in reserve at most, not 40 %"):
+        Car.of(leaning, SQUARE, margin=0.4)
 
 
 def test_a_cone_beside_the_centre_of_friction_is_refused():

@@ -5,7 +5,7 @@ from .lynch_mason import StableRegion, beyond_slider, stable_region
 from .placement import Placement, place_fingers
 from .point_contact import ContactMode, Motion, PointContact
 from .stable_centres import StableCentres
-from .straight import steering_forces, straight_force
+from .straight import kept_angle, steering_forces, straight_force
 from .two_point import composite_margin, spacing_margin, two_point_sticks
 from .wrench_cone import WrenchCone, narrowed
 
@@ -20,6 +20,7 @@ __all__ = [
     "beyond_slider",
     "composite_margin",
     "cone_twists",
+    "kept_angle",
     "narrowed",
     "place_fingers",
     "spacing_margin",

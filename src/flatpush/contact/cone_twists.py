@@ -10,7 +10,7 @@ from ..friction.surface import LimitSurface
 from ..geometry import cross, perpendicular
 from ..geometry.pose import Array
 from .point_contact import PointContact
-from .straight import PAST_EDGE, straight_force
+from .straight import PAST_EDGE
 from .wrench_cone import CLOSED, WrenchCone, narrowed, straight_wrenches
 
 Cost = Literal["flat", "pusher", "time"]
@@ -51,10 +51,21 @@ def cone_twists(
         InputError: if the fingers squeeze the object, or have no friction.
     """
     cone = WrenchCone.of(contacts)
-    inner = narrowed(contacts, margin, _straight(contacts, cone, surface)[:2])
+    if straight_wrenches(cone, surface) is None:
+        raise NoDubinsReduction(
+            _beside(
+                cone, ". A place nearer to the line of the normal through the centre of friction would help"
+            )
+        )
+    inner = narrowed(contacts, margin)
     pair = straight_wrenches(inner, surface)
     if pair is None:
-        raise NoDubinsReduction(_beside(inner, f" with the friction margin {margin:g}; take less of it"))
+        kept = np.floor(1000 * _most_kept(contacts, surface, margin)) / 10
+        raise NoDubinsReduction(
+            _beside(
+                inner, f" with {100 * margin:g} % of μ and of the spacing in reserve; it can keep {kept:g} %"
+            )
+        )
     towards = np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
     lefts, rights = _turns(cone, inner, surface, towards, 0 if quick else ON_FACE)
     left, right = _tightest(lefts, rights, hand, cost)
@@ -65,26 +76,14 @@ def cone_twists(
     return np.stack([left, straight, right])
 
 
-def _straight(contacts: Sequence[PointContact], cone: WrenchCone, surface: LimitSurface) -> Array:
-    """A wrench inside the cone that pushes straight: at the middle contact if that is inside, else in the middle."""
-    pair = straight_wrenches(cone, surface)
-    if pair is None:
-        raise NoDubinsReduction(
-            _beside(
-                cone, ". A place nearer to the line of the normal through the centre of friction would help"
-            )
-        )
-    middle = PointContact(
-        np.mean([c.point for c in contacts], axis=0),
-        np.mean([c.normal for c in contacts], axis=0),
-        contacts[0].friction,
-        hook=True,
-    )
-    try:
-        F = middle.wrench(straight_force(middle, surface))
-    except NoDubinsReduction:
-        return np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
-    return F if cone.depth(F) > 0 else np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
+def _most_kept(contacts: Sequence[PointContact], surface: LimitSurface, too_much: float) -> float:
+    """The greatest margin with which the fingers can push straight; 0 can, too_much cannot."""
+    low, high = 0.0, too_much
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        able = straight_wrenches(narrowed(contacts, middle), surface) is not None
+        low, high = (middle, high) if able else (low, middle)
+    return low
 
 
 def _beside(cone: WrenchCone, rest: str) -> str:
@@ -144,7 +143,7 @@ def _between(
     """The straight motion: the sum of the turns, or the nearest that the narrowed cone reaches."""
     V = np.array([*(left + right)[:2], 0.0])
     V = V / np.hypot(V[0], V[1])
-    if inner.depth(surface.wrench(V)) >= -CLOSED:
+    if inner.depth(surface.wrench(V)) >= 0:
         return V
     ends = [surface.twist(F)[:2] for F in pair]
     ends = [end / np.hypot(*end) for end in ends]

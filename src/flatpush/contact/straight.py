@@ -17,31 +17,36 @@ PAST_EDGE = 0.01
 def steering_forces(contact: PointContact, surface: LimitSurface, margin: float) -> Array:
     """Unit forces on the left edge, straight, and on the right edge of the friction cone less a margin, shape (3, 2).
 
-    Each edge is moved towards the straight force by a fraction of the angle between them. Two kinds of edge cannot be
-    used, and the cone then counts as ending earlier, before the same fraction is taken again:
+    The cone is that of (1 - margin) μ: motions whose forces it holds stick for every coefficient from there up. Two
+    kinds of edge cannot be used, and the cone then counts as ending earlier:
 
-    * Where the twist of the moved edge is a rotation about a support point, many forces share it. If some of them lie
-      outside the whole friction cone, the contact would be at the brink of sliding.
+    * Where the twist of the edge is a rotation about a support point, many forces share it. If some of them lie
+      outside the cone, the contact would lose its reserve.
     * Where the contact point would have to move against the inward normal, the fingertip would leave it.
 
     Raises:
         InputError: if the margin is not in [0, 1).
-        NoDubinsReduction: as straight_force, and where one of the forces has many twists.
+        NoDubinsReduction: as straight_force, where the straight force does not lie strictly inside the cone less the
+            margin (it says the reserve that could be kept), and where one of the forces has many twists.
     """
-    if not 0 <= margin < 1:
-        raise InputError("the friction margin is at least 0 and less than 1", value=margin)
+    half = kept_angle(contact.friction, margin)
     straight = straight_force(contact, surface)
     base = float(contact.force_angles(straight))
-    forces = []
-    for edge, side in zip(contact.force_edges(), (1.0, -1.0), strict=True):
-        angle = float(contact.force_angles(edge))
-        angle += margin * (base - angle)
-        shared = side * contact.force_angles(
-            contact.forces(surface.wrench_set(_twist(contact, surface, angle)))
+    if abs(base) >= half - 1e-9:
+        raise NoDubinsReduction(
+            f"the force that pushes straight takes so much friction that this push can keep"
+            f" {_percent(1 - np.tan(abs(base)) / contact.friction)} of μ in reserve at most, not {_percent(margin)}"
+            f" (planning: margin: friction). {_help(base, margin)}",
+            float(np.rad2deg(abs(base) - half)),
         )
-        if np.max(shared) > contact.half_angle + 1e-9:
+    forces = []
+    for side in (1.0, -1.0):
+        angle = side * half
+        wrenches = surface.wrench_set(_twist(contact, surface, angle))
+        shared = side * contact.force_angles(contact.forces(wrenches))
+        if wrenches.radius > 0 and np.max(shared) > half:
             inner = side * float(np.min(shared))
-            angle = inner + max(margin, PAST_EDGE) * (base - inner)
+            angle = inner + PAST_EDGE * (base - inner)
         if _leaves(contact, surface, angle):
             inside, outside = base, angle
             while abs(outside - inside) > 1e-12:
@@ -56,6 +61,22 @@ def steering_forces(contact: PointContact, surface: LimitSurface, margin: float)
             " force (a vertex of the limit surface), so it cannot steer. Push at another place"
         )
     return steering
+
+
+def kept_angle(friction: float, margin: float) -> float:
+    """Half the opening angle of the friction cone that is left when a part of μ is kept in reserve [rad].
+
+    Raises:
+        InputError: if the margin is not in [0, 1).
+    """
+    if not 0 <= margin < 1:
+        raise InputError("the friction margin is at least 0 and less than 1", value=margin)
+    return float(np.arctan((1 - margin) * friction))
+
+
+def _percent(share: float) -> str:
+    # Rounded down: what is named can be asked for.
+    return f"{np.floor(1000 * share) / 10:g} %"
 
 
 def _twist(contact: PointContact, surface: LimitSurface, angle: float) -> Array:
@@ -107,11 +128,11 @@ def straight_force(contact: PointContact, surface: LimitSurface) -> Array:
     return force
 
 
-def _help(angle: float) -> str:
+def _help(angle: float, margin: float = 0.0) -> str:
     contact = "a contact nearer to the line of the normal through the centre of friction would help"
     if abs(angle) > np.deg2rad(80):
         return f"No sensible friction would do; {contact}"
-    return f"More friction than {np.tan(abs(angle)):.2f} or {contact}"
+    return f"More friction than {np.tan(abs(angle)) / (1 - margin):.2f} or {contact}"
 
 
 def _root(contact: PointContact, surface: LimitSurface) -> Array:

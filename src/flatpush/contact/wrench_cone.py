@@ -1,7 +1,7 @@
 """The composite wrench cone of fingertips that push together, as its rays and its faces ([Zhou2017] Sec. 4.2)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -11,7 +11,6 @@ from ..errors import InputError
 from ..friction.ellipsoid import Ellipsoid
 from ..friction.exact import Exact
 from ..friction.surface import LimitSurface, WrenchSet
-from ..geometry import rotate
 from ..geometry.pose import Array
 from .point_contact import PointContact
 
@@ -126,30 +125,16 @@ class WrenchCone:
         return axis / size
 
 
-def narrowed(contacts: Sequence[PointContact], margin: float, straight: ArrayLike) -> WrenchCone:
-    """The composite cone of two contacts less a friction margin.
+def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:
+    """The composite cone of two contacts less a friction margin, in [0, 1).
 
-    Each edge of a friction cone is moved towards the straight force (or, where a contact cannot exert that, the nearest
-    it can) by a fraction of the angle between them. Then each finger's force is shared with the other,
-    1 - margin/2 to margin/2: the lighter finger keeps margin/2 of the load at least. Under parallel normals that is
-    the cone of two contacts that stand at (1 - margin) × spacing.
-
-    Args:
-        margin: in [0, 1).
-        straight: a force (2,) that pushes straight on.
+    It is that of contacts with (1 - margin) μ, each finger's force shared with the other, 1 - margin/2 to margin/2: the
+    lighter finger keeps margin/2 of the load at least. Under parallel normals that is the cone of two contacts that
+    stand at (1 - margin) × spacing.
     """
     if not 0 <= margin < 1:
         raise InputError("the friction margin is at least 0 and less than 1", value=margin)
-    edges = []
-    for contact in contacts:
-        base = float(contact.force_angles(straight))
-        base = float(np.clip(base, -contact.half_angle, contact.half_angle))
-        angles = (contact.half_angle, -contact.half_angle)
-        edges.append([contact.wrench(rotate(a + margin * (base - a), contact.normal)) for a in angles])
-    first, second = np.array(edges)
-    own, other = 1 - 0.5 * margin, 0.5 * margin
-    shared = np.concatenate([own * first + other * second, other * first + own * second])
-    return WrenchCone.spanned(shared, lever_of(contacts))
+    return shared([replace(c, friction=(1 - margin) * c.friction) for c in contacts], 0.5 * margin)
 
 
 def shared(contacts: Sequence[PointContact], share: float) -> WrenchCone:

@@ -313,7 +313,7 @@ class MarginPart(Part):
     """What is kept free of the limits."""
 
     friction: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] = Field(
-        default=0.2, description="The part by which the friction cone is narrowed, from 0 to less than 1."
+        default=0.2, description="The part of the friction that is kept in reserve, from 0 to less than 1."
     )
     clearance: NotNegative = unstated("The distance kept from obstacles and bounds; 0 if left out.")
 

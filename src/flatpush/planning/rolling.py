@@ -24,6 +24,8 @@ from .timing import Trapezoid
 NODES, GAUSS, FINE = 17, 24, 400
 # The speed along the way is right to a few parts in 10⁵, so this much of the limits is used.
 SLOWER = 0.999
+# From sample to sample the finger makes the mean of the motions between, which takes up to 1e-5 more of the friction.
+BETWEEN = 1e-4
 SLACK = 0.3  # headings beyond the first word's over which the centres are tabulated [rad]
 
 
@@ -82,13 +84,15 @@ def _tabulate(scene: Scene, option: PushOption, turns: list[str], values: Array)
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     rows: dict[str, list[Array]] = {"left": [], "straight": [], "right": []}
     assert option.car is not None
+    margin = scene.planning.friction_margin
+    margin += BETWEEN * (1 - margin)
     for angle in 0.5 * (low + high) + 0.5 * (high - low) * nodes:
         at = rolled(scene.object.outline, option.push.at, scene.pusher.tip_radius, float(angle))
         car = Car.of(
             contact_at(scene, at),
             option.car.surface,
             cof=scene.object.cof,
-            margin=scene.planning.friction_margin,
+            margin=margin,
         )
         rows["left"].append(car.left_centre)
         rows["right"].append(car.right_centre)

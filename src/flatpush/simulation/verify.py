@@ -78,10 +78,17 @@ def verify(plan: Plan) -> Report:
     tolerance = np.array(plan.scene.planning.goal_tolerance)
     excess = float(np.max(goal / tolerance))
     claims.append(Claim("reaches the goal", None, excess, 1.0, excess <= 1.0, "within the goal tolerance"))
-    for key in ("friction_margin", "motion_cone_margin_degrees"):
+    asked = plan.scene.planning.friction_margin
+    for key, least in (
+        ("friction_margin", asked),
+        ("spacing_margin", asked),
+        ("motion_cone_margin_degrees", 0.0),
+    ):
         value = getattr(computed, key)
         if value is not None:
-            claims.append(Claim(f"{key} kept", None, value, 0.0, bool(value >= -ABSOLUTE), "not negative"))
+            claims.append(
+                Claim(f"{key} kept", None, value, least, bool(value >= least - ABSOLUTE), "at least as asked")
+            )
     clearance = computed.clearance
     if clearance is not None:
         need = plan.scene.planning.clearance

@@ -93,8 +93,7 @@ class Car:
         """The car of a contact under a limit surface.
 
         Args:
-            margin: fraction of the angle by which each edge of the friction cone is moved towards the straight force
-                (see contact.steering_forces).
+            margin: fraction of μ that every motion keeps in reserve (see contact.steering_forces).
 
         Raises:
             NoDubinsReduction: if the push cannot turn both ways (docs/errata.md row 9).

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...contact import kept_angle
 from ...geometry import cross, perpendicular, rotate, shift_twist, velocity_at
 from ...geometry.pose import Array
 from ...steering.car import Car
@@ -74,7 +75,7 @@ def contact_car(
         contact, normal: point of the outline and inward unit normal there, in O, shape (2,).
         cof: centre of friction in O, shape (2,). rho: a/b [m²].
         friction: between finger and object.
-        reserve: fraction of the angle between each edge of the friction cone and the straight force that plans leave.
+        reserve: fraction of μ that plans keep in reserve.
         edge: the same fraction for what feedback may use.
         sides, edges: how much farther than that the turning centres lie on the left and on the right, with the reserve
             and at the edge: limit surfaces are no ellipsoids. See sides_of.
@@ -98,11 +99,13 @@ def contact_car(
         return None
     level = rho / r
 
+    # With its reserve the cone must still hold the force that pushes straight.
+    if abs(beta) >= kept_angle(friction, max(reserve, edge)):
+        return None
+
     def centres(margin: float, share: tuple[float, float]) -> tuple[float, float]:
-        return (
-            -share[0] * level / math.tan((1 - margin) * right),
-            -share[1] * level / math.tan((1 - margin) * left),
-        )
+        kept = kept_angle(friction, margin)
+        return -share[0] * level / math.tan(beta - kept), -share[1] * level / math.tan(beta + kept)
 
     far, near = centres(reserve, sides)
     along, radius = 0.5 * (far + near), 0.5 * (far - near)
@@ -134,13 +137,13 @@ def sides_of(car: Car, friction: float, margin: float) -> tuple[float, tuple[flo
     """
     to = -car.contact.point
     r = float(np.hypot(*to))
-    h, half = to / r, math.atan(friction)
+    h, kept = to / r, kept_angle(friction, margin)
     rho = r * float((car.flat_point - car.cof) @ h)
     beta = float(np.arctan2(cross(h, car.contact.normal), h @ car.contact.normal))
     shares = []
-    for centre, angle in ((car.left_centre, beta - half), (car.right_centre, beta + half)):
+    for centre, angle in ((car.left_centre, beta - kept), (car.right_centre, beta + kept)):
         left = float(cross(h, centre - car.cof))
-        shares.append(left * r / (-rho / math.tan((1 - margin) * angle)))
+        shares.append(left * r / (-rho / math.tan(angle)))
     return rho, (shares[0], shares[1])
 
 
