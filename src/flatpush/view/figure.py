@@ -38,7 +38,7 @@ def save_figure(
     else:
         from .plan_figure import draw_plan
 
-        content = draw_plan(plan, ending, rollouts, explored)
+        content = draw_plan(plan, rollouts, explored).encode(ending)
     write_atomically(path, content)
 
 

@@ -42,7 +42,7 @@ def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
 
 
 def _view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollout]) -> tuple[float, ...]:
-    from .plan_figure import view_box
+    from .table import view_box
 
     return tuple(float(v) for v in view_box(plan, traces, rollouts))
 

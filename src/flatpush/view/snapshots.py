@@ -1,27 +1,27 @@
 """Moments of a plan side by side, as [Zhou2017] Fig. 11."""
 
 from pathlib import Path
-from textwrap import shorten
-from typing import Any
 
 import numpy as np
 
 from ..documents.atomic import write_atomically
 from ..errors import InputError
+from ..geometry import transform
 from ..geometry.pose import Array
 from ..problem import Plan, PushSegment
-from . import palette
-from .canvas import SOFT, drawing_style, figure_bytes, headline, new_figure, table_axes
+from . import drawing as d
+from . import palette, words
+from .drawing import PAGE, SOFT, Drawing, Look
 from .figure import check_figure_at
-from .plan_figure import MM, draw_fingers, draw_object, draw_workspace, view_box
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import BOTTOM, LEFT, Panel
+from .table import MM, draw_fingers, draw_object, draw_workspace, view_box
 from .timeline import Timeline, doing
-from .trace import PushTrace, fingertips, trace_pushes
-from .words import plan_subtitle, plan_title
+from .trace import fingers_at, fingertips, trace_pushes
 
 ENDINGS = (".svg", ".png")
 COLUMNS = 4
-WIDTH = 8.0  # inches
-ROOM = 36  # letters above a panel
+ABOVE = 24.0  # room for the words above a panel [pt]
 
 
 def save_snapshots(plan: Plan, path: str | Path, count: int = 8) -> None:
@@ -39,7 +39,7 @@ def save_snapshots(plan: Plan, path: str | Path, count: int = 8) -> None:
     if count < 2:
         raise InputError("snapshots show at least the start and the end", value=count)
     check_snapshots(path)
-    write_atomically(path, draw_snapshots(plan, Path(path).suffix.lower(), count))
+    write_atomically(path, draw_snapshots(plan, count).encode(Path(path).suffix.lower()))
 
 
 def check_snapshots(path: str | Path) -> None:
@@ -51,30 +51,38 @@ def check_snapshots(path: str | Path) -> None:
     check_figure_at(path, ENDINGS)
 
 
-def draw_snapshots(plan: Plan, extension: str, count: int = 8) -> bytes:
-    """The picture as ".png" or ".svg"."""
-    timeline, traces = Timeline.of(plan), trace_pushes(plan)
+def draw_snapshots(plan: Plan, count: int = 8) -> Drawing:
+    """The moments in rows of at most four, under one title."""
+    timeline = Timeline.of(plan)
     times = moments(timeline, count)
-    box = view_box(plan, traces)
+    box = view_box(plan, trace_pushes(plan))
     columns = min(COLUMNS, len(times))
     rows = -(-len(times) // columns)
-    aspect = (box[3] - box[1]) / (box[2] - box[0])
-    with drawing_style():
-        panel = 0.86 * WIDTH / columns * float(np.clip(aspect, 0.3, 2.5))
-        figure = new_figure(WIDTH, 1.0 + rows * (0.45 + panel))
-        headline(figure, plan_title(plan), plan_subtitle(plan))
-        for k, time in enumerate(times):
-            axes = table_axes(figure.add_subplot(rows, columns, k + 1))
-            left, bottom = k % columns == 0, k + columns >= len(times)
-            axes.set(xlim=box[::2], ylim=box[1::2])
-            axes.set_xlabel("x [mm]" if bottom else "", fontsize=7)
-            axes.set_ylabel("y [mm]" if left else "", fontsize=7)
-            axes.tick_params(labelsize=6.5, labelleft=left, labelbottom=bottom)
-            axes.set_aspect("equal")
-            what = shorten(doing(plan, timeline, time), ROOM, placeholder=" …")
-            axes.set_title(f"{time:.1f} s\n{what}", fontsize=7, color=SOFT, loc="left")
-            _moment(axes, plan, timeline, traces, time)
-        return figure_bytes(figure, extension, plan_title(plan))
+    aspect = float(np.clip((box[3] - box[1]) / (box[2] - box[0]), 0.3, 2.0))
+    title, subtitle = words.plan_title(plan), words.plan_subtitle(plan)
+    width = (PAGE - 2 * EDGE - LEFT + 8.0) / columns - 8.0
+    height = width * aspect
+    top = title_height(title, subtitle)
+    below = top + rows * (ABOVE + height) + BOTTOM
+    entries = [
+        Entry(words.START, Look(palette.START, 0.8, (2.0, 1.5)), "box"),
+        Entry(words.GOAL, Look(palette.GOAL, 0.8, (2.0, 1.5)), "box"),
+        Entry(words.WAY, Look(palette.push_colour(0) if len(plan.pushes) == 1 else SOFT, 1.4)),
+    ]
+    page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
+    for k, time in enumerate(times):
+        row, column = divmod(k, columns)
+        left, high = EDGE + LEFT + column * (width + 8.0), top + row * (ABOVE + height) + ABOVE
+        panel = Panel(page, (left, high, left + width, high + height), box)
+        first, last = column == 0, k + columns >= len(times)
+        panel.axes("x [mm]" if last else "", "y [mm]" if first else "", (last, first))
+        page.add(d.Text(left, high - 13, f"{time:.1f} s", 7.5, d.INK, bold=True), 20)
+        what = d.shortened(doing(plan, timeline, float(time)), 7.0, width)
+        page.add(d.Text(left, high - 4, what, 7.0, SOFT), 20)
+        _moment(panel, plan, timeline, float(time))
+    return page
 
 
 def moments(timeline: Timeline, count: int) -> Array:
@@ -89,31 +97,33 @@ def moments(timeline: Timeline, count: int) -> Array:
     return np.interp(np.linspace(0.0, way[-1], count), way, timeline.times)
 
 
-def _moment(axes: Any, plan: Plan, timeline: Timeline, traces: tuple[PushTrace, ...], time: float) -> None:
+def way_until(plan: Plan, timeline: Timeline, time: float) -> list[tuple[int, Array]]:
+    """Each push that has begun: its number, and the way of the centre of friction until a time; it ends at the object.
+
+    Samples may be far apart on a straight, so the pose at the time itself is the last point.
+    """
+    found: list[tuple[int, Array]] = []
+    pose, _, _, now = timeline.at(time)
+    for segment, push in enumerate(plan.segments):
+        if segment > now or not isinstance(push, PushSegment):
+            continue
+        gone = timeline.object[(timeline.segment == segment) & (timeline.times <= time)]
+        poses = np.concatenate([gone, pose[None]]) if segment == now else gone
+        found.append((len(found), transform(poses, plan.scene.object.cof)))
+    return found
+
+
+def _moment(panel: Panel, plan: Plan, timeline: Timeline, time: float) -> None:
     scene = plan.scene
-    draw_workspace(axes, scene)
+    draw_workspace(panel, scene)
     for pose, colour in ((scene.start_pose, palette.START), (scene.goal_pose, palette.GOAL)):
-        draw_object(axes, scene, pose, colour, linewidth=0.8, alpha=0.6, zorder=3, linestyle=(0, (2, 1.5)))
+        draw_object(panel, scene, pose, Look(colour, 0.8, (2.0, 1.5), 0.6), 3)
     pose, pusher, _, number = timeline.at(time)
-    passed = [i for i, s in enumerate(plan.segments) if isinstance(s, PushSegment)]
     colour = SOFT
-    for trace, segment in zip(traces, passed, strict=True):
-        if segment > number:
-            break
-        colour = palette.push_colour(trace.number)
-        here = timeline.segment == segment
-        gone = timeline.object[here & (timeline.times <= time)]
-        if len(gone):
-            axes.plot(*(MM * gone[:, :2]).T, color=colour, linewidth=1.4, zorder=4)
-    draw_object(axes, scene, pose, colour, fill=0.35, linewidth=1.4, zorder=6)
+    for push, way in way_until(plan, timeline, time):
+        colour = palette.push_colour(push)
+        panel.line(MM * way, Look(colour, 1.4), 7)
+    draw_object(panel, scene, pose, Look(colour, 1.3, fill=colour, fill_opacity=0.3), 6)
+    panel.disc(MM * transform(pose, scene.object.cof), 1.6, Look(fill=colour), 7)
     if timeline.moves:
-        fingers = _fingers(plan, number)
-        draw_fingers(axes, scene, fingertips(pusher, fingers), palette.PUSHER, zorder=7)
-
-
-def _fingers(plan: Plan, number: int) -> Array:
-    """The fingertips in E of the push that a segment is, or leads to, or comes from."""
-    for segment in (*plan.segments[number:], *plan.segments[number::-1]):
-        if isinstance(segment, PushSegment):
-            return segment.fingers
-    return np.zeros((0, 2))
+        draw_fingers(panel, scene, fingertips(pusher, fingers_at(plan, number)), z=8)

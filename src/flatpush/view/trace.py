@@ -57,6 +57,15 @@ def fingertips(pusher: Array, fingers: Array) -> Array:
     return transform(np.asarray(pusher)[..., None, :], fingers)
 
 
+def fingers_at(plan: Plan, number: int) -> Array:
+    """Fingertips in E, shape (k, 2), in a segment: its own, or of the push it leads to, else of the one before."""
+    segments = plan.segments
+    for segment in (*segments[number:], *reversed(segments[:number])):
+        if isinstance(segment, PushSegment):
+            return segment.fingers
+    return np.zeros((0, 2))
+
+
 def rollout_paths(rollout: Rollout, plan: Plan, traces: tuple[PushTrace, ...]) -> list[Array]:
     """A simulated run beside the plan: paths of the same flat points, else of the centre of friction."""
     starts = [

@@ -1,5 +1,6 @@
-"""The picture of a closed loop: where the object should go and went, its error and the controller's mode over time."""
+"""The picture of a closed loop: where the object should go and went; over time its error, contact and controller."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,29 +9,35 @@ from ..control.loop.closed_loop import ClosedLoopRun
 from ..documents.atomic import write_atomically
 from ..geometry import transform
 from ..geometry.pose import Array
-from ..problem import Plan
-from . import palette
-from .canvas import SOFT, drawing_style, figure_bytes, headline, legend_below, new_figure, settle, table_axes
+from ..problem import Plan, Scene
+from . import drawing as d
+from . import palette, words
+from .drawing import PAGE, SOFT, Box, Drawing, Look
 from .figure import check_ending
-from .plan_figure import MM, draw_ends, draw_object, draw_workspace, view_box
+from .labels import Labels
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import AXIS, BOTTOM, LEFT, Panel, number, ticks
+from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn
 from .trace import trace_pushes
 
 ENDINGS = (".svg", ".png")
-_COLOURS = {
-    "path": palette.PUSHES[0],
-    "tracking": palette.PUSHES[0],
-    "posture": palette.PUSHES[0],
-    "push": palette.PUSHES[0],
-    "look": "#bbbbbb",
-    "resume": palette.SIMULATED,
-    "retreat": palette.PUSHES[1],
-    "saturated": palette.SIMULATED,
-    "guarded": palette.PUSHES[1],
-    "waiting": "#777777",
-    "held": palette.START,
-    "transit": palette.PUSHES[3],
-    "done": palette.GOAL,
+STRIP = 11.0  # height of a strip over time [pt]
+MOST_SAMPLES = 400  # of the clearance
+REFERENCE, ACTUAL = Look("#b3b3b3", 3.0), Look(palette.SIMULATED, 1.2)
+TOLERANCE = Look(palette.GOAL, 1.0, (3.0, 2.0))
+CLEARANCE = Look(palette.OBSTACLE, 1.0, (1.5, 1.5))
+CONTACTS = {
+    "sticking": (words.STICKS, palette.PUSHES[0]),
+    "sliding_left": (words.SLIDES_LEFT, "#f0b429"),
+    "sliding_right": (words.SLIDES_RIGHT, "#b35c00"),
+    "separation": (words.OFF, "#d4d4d4"),
+    "rest": (words.RESTS, "#9a9a9a"),
 }
+MODES = {
+    "path": "#4477aa", "tracking": "#4477aa", "posture": "#66ccee", "push": "#4477aa", "look": "#c9c9c9",
+    "resume": "#228833", "retreat": "#e6a100", "saturated": "#cc3311", "guarded": "#ee7733", "waiting": "#777777",
+    "held": "#111111", "transit": "#aa3377", "done": "#0061b5",
+}  # fmt: skip
 
 
 def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str = "") -> None:
@@ -39,64 +46,180 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
     Raises:
         InputError: if the ending is another, or the file cannot be written.
     """
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     ending = check_ending(path, ENDINGS)
+    write_atomically(path, draw_track(plan, run, subtitle).encode(ending))
+
+
+def draw_track(plan: Plan, run: ClosedLoopRun, subtitle: str = "") -> Drawing:
+    """The same as a drawing."""
+    scene = plan.scene
+    title = f"{scene.object.name}: the plan followed under feedback, {float(run.times[-1]):.0f} s"
+    top = title_height(title, subtitle) + 6
+    traces = trace_pushes(plan)
+    actual = MM * transform(run.object, scene.object.cof)
+    box = _table_box(plan, run, view_box(plan, traces))
+    left, wide = EDGE + LEFT, 0.56 * (PAGE - 2 * EDGE) - LEFT
+    height = float(np.clip(wide * (box[3] - box[1]) / (box[2] - box[0]), 190.0, 300.0))
+    entries, strips = _legend(scene, run), _strip_entries(run)
+    width = PAGE - 2 * EDGE
+    bottom = top + height + BOTTOM
+    lower = bottom + legend_height(entries, width) + 4
+    heads = [words.CONTACT, words.CONTROLLER]
+    rows = [legend_height(some, width - 62) for some in strips]
+    page = Drawing(PAGE, lower + sum(rows) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, bottom, width)
+    for head, some, room in zip(heads, strips, rows, strict=True):
+        page.add(d.Text(EDGE, lower + 10, head, 8.0, SOFT, bold=True), 20)
+        draw_legend(page, some, EDGE + 62, lower, width - 62)
+        lower += room
+
+    table = Panel(page, (left, top, left + wide, top + height), box)
+    table.axes()
+    draw_workspace(table, scene)
+    draw_endpoints(table, plan, Labels(table, np.concatenate([what_is_drawn(plan, traces), actual])))
+    draw_object(table, scene, run.object[-1], Look(palette.SIMULATED, 1.0), 6)
+    for push in plan.pushes:
+        table.line(MM * transform(push.object, scene.object.cof), REFERENCE, 4)
+    table.line(actual, ACTUAL, 7)
+
+    right = left + wide + 16 + LEFT
+    foot = top + height
+    _error(page, (right, top, PAGE - EDGE, foot - 2 * STRIP - 14), plan, run)
+    step = float(run.times[1] - run.times[0]) if len(run.times) > 1 else 1.0
+    span = (float(run.times[0]), float(run.times[-1]) + step)
+    for k, (values, looks) in enumerate(((run.contacts, CONTACTS), (run.modes, None))):
+        strip_top = foot - (2 - k) * STRIP - 5 * (1 - k)
+        strip = (right, strip_top, PAGE - EDGE, strip_top + STRIP)
+        _strip(
+            page,
+            strip,
+            span,
+            run.times,
+            values,
+            {w: _colour(w, run) if looks is None else looks[w][1] for w in values},
+        )
+        page.add(d.Text(right - 4, strip_top + 8, heads[k], 6.5, SOFT, "end"), 20)
+    for value in ticks(*span, (PAGE - EDGE - right) / 40):
+        x = right + (value - span[0]) / (span[1] - span[0]) * (PAGE - EDGE - right)
+        page.add(d.Text(x, foot + 10, number(value), 7.5, SOFT, "middle"), 20)
+    page.add(d.Text((right + PAGE - EDGE) / 2, foot + 21, "time [s]", 8.5, SOFT, "middle"), 20)
+    return page
+
+
+def distances(plan: Plan, run: ClosedLoopRun) -> Array:
+    """Of the centre of friction from the nearest pushed path, or from the goal for a controller that plans anew [m]."""
     cof = plan.scene.object.cof
     actual = transform(run.object, cof)
-    modes = list(dict.fromkeys(run.modes))
-    replans = "look" in modes
-    if replans:
-        near = np.hypot(*(actual - transform(plan.scene.goal_pose, cof)).T)
-    else:
-        near = np.min([_distance(actual, transform(push.object, cof)) for push in plan.pushes], axis=0)
-    with drawing_style():
-        figure = new_figure(width=9.6, height=5.2)
-        headline(figure, f"{plan.scene.object.name}: this plan under feedback", subtitle)
-        look = {m: _COLOURS.get(m, palette.PUSHES[(k + 2) % 6]) for k, m in enumerate(modes)}
-        legend_below(
-            figure,
-            [
-                Line2D(
-                    [],
-                    [],
-                    color=palette.START,
-                    linewidth=3,
-                    alpha=0.3,
-                    label="first plan" if replans else "reference",
-                ),
-                Line2D([], [], color=palette.SIMULATED, linewidth=1.2, label="actual, centre of friction"),
-                *(Patch(facecolor=look[m], label=m) for m in modes),
-            ],
+    if _plans_anew(run):
+        return np.linalg.norm(actual - transform(plan.scene.goal_pose, cof), axis=1)
+    paths = [_distance(actual, transform(push.object, cof)) for push in plan.pushes]
+    return np.asarray(np.min(paths, axis=0))
+
+
+def clearances(scene: Scene, poses: Array) -> Array:
+    """Of the object at poses (n, 3) from obstacles and bounds, shape (n,) [m]; below 0 outside of the bounds."""
+    from shapely import MultiPolygon, Polygon, distance, polygons
+
+    bodies = polygons(transform(poses[:, None], scene.object.outline.polyline()[None]))
+    found = np.full(len(poses), np.inf)
+    if scene.workspace.obstacles:
+        blocked = MultiPolygon([Polygon(o.polyline()) for o in scene.workspace.obstacles])
+        found = np.minimum(found, distance(bodies, blocked))
+    if scene.workspace.bounds is not None:
+        x0, y0, x1, y1 = scene.workspace.bounds
+        corners = transform(poses[:, None], scene.object.outline.polyline()[None])
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        inside = np.min(np.concatenate([low - [x0, y0], [x1, y1] - high], axis=1), axis=1)
+        found = np.minimum(found, inside)
+    return found
+
+
+def _error(page: Drawing, frame: Box, plan: Plan, run: ClosedLoopRun) -> None:
+    """The distance over time with the tolerance, and the clearance where there is something to clear."""
+    near = MM * distances(plan, run)
+    tolerance = MM * float(np.hypot(*plan.scene.planning.goal_tolerance[:2]))
+    span = (float(run.times[0]), max(float(run.times[-1]), float(run.times[0]) + 1e-6))
+    most = 1.08 * max(float(near.max()), 1.3 * tolerance)
+    panel = Panel(page, frame, (span[0], 0.0, span[1], most), equal=False)
+    panel.axes("", f"off the {'goal' if _plans_anew(run) else 'reference'} [mm]", (False, True))
+    if _has_clearance(plan.scene):
+        some = np.unique(np.linspace(0, len(run.times) - 1, MOST_SAMPLES).astype(int))
+        gap = MM * clearances(plan.scene, run.object[some])
+        panel.line(np.stack([run.times[some], np.clip(gap, 0.0, most)], axis=1), CLEARANCE, 3)
+        page.add(
+            d.Text(
+                frame[2],
+                frame[1] + 8,
+                f"least clearance {gap.min():.1f} mm",
+                7.5,
+                palette.OBSTACLE,
+                "end",
+                halo=True,
+            ),
+            20,
         )
-        grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1), height_ratios=(4, 1))
-        wide, error = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
-        strip = figure.add_subplot(grid[1, 1], sharex=error)
-        table_axes(wide)
-        traces = trace_pushes(plan)
-        box = view_box(plan, traces)
-        seen = MM * np.concatenate([actual, transform(run.object[-1], plan.scene.object.outline.vertices)])
-        low, high = np.minimum(box[:2], seen.min(axis=0)), np.maximum(box[2:], seen.max(axis=0))
-        settle(figure, [(wide, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))])
-        draw_workspace(wide, plan.scene)
-        draw_ends(wide, plan, traces)
-        draw_object(wide, plan.scene, run.object[-1], palette.SIMULATED, linewidth=1.0, zorder=6)
-        for push in plan.pushes:
-            line = MM * transform(push.object, plan.scene.object.cof)
-            wide.plot(*line.T, color=palette.START, linewidth=3, alpha=0.3, zorder=4)
-        wide.plot(*(MM * actual).T, color=palette.SIMULATED, linewidth=1.2, zorder=7)
-        error.plot(run.times, MM * near, color=palette.SIMULATED, linewidth=1.2)
-        error.set_ylabel(f"distance from the {'goal' if replans else 'reference'} [mm]")
-        error.set_ylim(bottom=0)
-        error.tick_params(labelbottom=False)
-        step = float(run.times[1] - run.times[0]) if len(run.times) > 1 else 1.0
-        for mode in modes:
-            on = [(float(t), step) for t, m in zip(run.times, run.modes, strict=True) if m == mode]
-            strip.broken_barh(on, (0, 1), facecolor=look[mode], linewidth=0)
-        strip.set(yticks=[], xlabel="time [s]", ylim=(0, 1), xlim=(run.times[0], run.times[-1] + step))
-        strip.set_ylabel("mode", color=SOFT)
-        write_atomically(path, figure_bytes(figure, ending, "feedback"))
+    panel.line(np.array([[span[0], tolerance], [span[1], tolerance]]), TOLERANCE, 4)
+    panel.line(np.stack([run.times, near], axis=1), ACTUAL, 5)
+
+
+def _strip(
+    page: Drawing,
+    frame: Box,
+    span: tuple[float, float],
+    times: Array,
+    values: Sequence[str],
+    colours: dict[str, str],
+) -> None:
+    """What holds when, as coloured stretches from left to right."""
+    left, top, right, bottom = frame
+    names = np.array(values)
+    starts = np.concatenate([[0], np.flatnonzero(names[1:] != names[:-1]) + 1])
+    ends = np.append(times[starts[1:]], span[1])
+    for first, end in zip(starts, ends, strict=True):
+        x0, x1 = (left + (t - span[0]) / (span[1] - span[0]) * (right - left) for t in (times[first], end))
+        corners = np.array([[x0, top], [x1, top], [x1, bottom], [x0, bottom]])
+        page.add(d.Line(corners, Look(fill=colours[names[first]]), closed=True), 4)
+    page.add(d.Line(np.array([[left, bottom], [right, bottom]]), Look(AXIS, 0.7)), 5)
+
+
+def _table_box(plan: Plan, run: ClosedLoopRun, box: Box) -> Box:
+    corners = transform(run.object[-1], plan.scene.object.outline.polyline())
+    seen = MM * np.concatenate([transform(run.object, plan.scene.object.cof), corners])
+    low, high = np.minimum(box[:2], seen.min(axis=0)), np.maximum(box[2:], seen.max(axis=0))
+    return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+
+
+def _legend(scene: Scene, run: ClosedLoopRun) -> list[Entry]:
+    entries = [
+        Entry("first plan" if _plans_anew(run) else "reference", REFERENCE),
+        Entry("actual, centre of friction", ACTUAL),
+        Entry("goal tolerance", TOLERANCE),
+    ]
+    return entries + ([Entry("clearance", CLEARANCE)] if _has_clearance(scene) else [])
+
+
+def _strip_entries(run: ClosedLoopRun) -> tuple[list[Entry], list[Entry]]:
+    """What the colours of the two strips mean, only those that occur."""
+    contacts = [Entry(CONTACTS[c][0], Look(fill=CONTACTS[c][1]), "box") for c in dict.fromkeys(run.contacts)]
+    modes = [Entry(m, Look(fill=_colour(m, run)), "box") for m in dict.fromkeys(run.modes)]
+    return contacts, modes
+
+
+def _colour(mode: str, run: ClosedLoopRun) -> str:
+    """Of a controller's mode; one that is not known gets a colour of its own."""
+    if mode in MODES:
+        return MODES[mode]
+    unknown = [m for m in dict.fromkeys(run.modes) if m not in MODES]
+    return palette.push_colour(6 + unknown.index(mode))
+
+
+def _plans_anew(run: ClosedLoopRun) -> bool:
+    return "look" in run.modes
+
+
+def _has_clearance(scene: Scene) -> bool:
+    return bool(scene.workspace.obstacles) or scene.workspace.bounds is not None
 
 
 def _distance(points: Array, line: Array) -> Array:

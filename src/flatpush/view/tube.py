@@ -1,7 +1,6 @@
-"""The picture of many disturbed runs: the tube in which the object stays, and where it ends."""
+"""The picture of many disturbed runs: the tube in which the object stays, its width, and where the object ends."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -10,33 +9,33 @@ from ..errors import InputError
 from ..geometry import transform
 from ..geometry.pose import Array
 from ..simulation.study import Runs
-from . import palette
-from .canvas import (
-    INK,
-    SOFT,
-    drawing_style,
-    figure_bytes,
-    headline,
-    legend_below,
-    new_figure,
-    settle,
-    table_axes,
-)
+from . import drawing as d
+from . import palette, words
+from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .figure import check_ending
-from .plan_figure import MM, draw_ends, draw_object, draw_workspace, view_box
+from .labels import Labels
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import BOTTOM, LEFT, Panel
+from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn
 from .trace import trace_pushes
 
 ENDINGS = (".svg", ".png")
 MOST_DRAWN = 200
-_BANDS = ((0.025, 0.975, 0.20), (0.25, 0.75, 0.34))  # quantiles and opacity
-_FEWEST = 5  # runs under way at a sample, for a band there
+BANDS = ((0.025, 0.975, 0.22), (0.25, 0.75, 0.42))  # quantiles and opacity
+FEWEST = 5  # runs under way at a sample, for a band there
+ACROSS = 62.0  # height of the panel that shows how wide the tube is [pt]
+TOLERANCE = Look(palette.GOAL, 1.0, (3.0, 2.0))
+STUCK, SLIPPED = palette.PUSHES[0], palette.SIMULATED
+FAR_OFF = 4.0  # times the width of 95 % of the ends; a picture of all of them would show only the few
+CHI_SQUARE = 5.991  # of two degrees of freedom at 95 %
 
 
 def tube_figure(runs: Runs, path: str | Path) -> None:
     """Draws the band that holds the centre of friction in 95 % (and 50 %) of the runs, and the ends of the runs.
 
     At every sample of the plan the band holds these parts of the runs that are still under way, counted across the
-    direction in which their middle moves.
+    direction in which their middle moves. A tube is narrow beside the table it lies on, so that its width is drawn a
+    second time, at its own scale, over the way.
 
     Args:
         runs: recorded (study(…, record=True)).
@@ -48,111 +47,181 @@ def tube_figure(runs: Runs, path: str | Path) -> None:
     ending = check_ending(path, ENDINGS)
     if runs.object is None:
         raise InputError("the tube needs runs that were recorded", hint="study(…, record=True)")
+    write_atomically(path, draw_tube(runs).encode(ending))
+
+
+def draw_tube(runs: Runs) -> Drawing:
+    """The same as a drawing; the runs are recorded."""
+    assert runs.object is not None
     plan = runs.plan
-    with drawing_style():
-        figure = new_figure(width=9.6, height=5.6)
-        title = f"{plan.scene.object.name}: {len(runs)} runs of this plan"
-        headline(figure, title, _subtitle(runs))
-        _legend(figure)
-        wide, close = figure.subplots(1, 2, width_ratios=(1.75, 1))
-        table_axes(wide), table_axes(close).set_ylabel("")
-        close.set_title("ends of the origin of the drawing", loc="left", color=SOFT)
-        traces = trace_pushes(plan)
-        settle(figure, [(wide, _wide_box(runs, view_box(plan, traces))), (close, _close_box(runs))])
-        draw_workspace(wide, plan.scene)
-        draw_ends(wide, plan, traces)
-        for pose in runs.final[:MOST_DRAWN]:
-            draw_object(wide, plan.scene, pose, palette.SIMULATED, linewidth=0.35, alpha=0.22, zorder=2)
-        paths = transform(runs.object[..., :3].reshape(-1, 3), plan.scene.object.cof).reshape(
-            *runs.object.shape[:2], 2
-        )
-        for first, last in _stretches(paths):
-            _band(wide, MM * paths[:, first:last])
-        _ends(close, runs)
-        write_atomically(path, figure_bytes(figure, ending, title))
+    title, subtitle = f"{plan.scene.object.name}: {len(runs)} runs of this plan", _subtitle(runs)
+    top = title_height(title, subtitle) + 6
+    traces = trace_pushes(plan)
+    box = _table_box(runs, view_box(plan, traces))
+    left = EDGE + LEFT
+    wide = 0.62 * (PAGE - 2 * EDGE) - LEFT
+    height = float(np.clip(wide * (box[3] - box[1]) / (box[2] - box[0]), 190.0, 300.0))
+    right = left + wide + 12 + LEFT
+    across = top + height + BOTTOM + 22
+    entries = _legend(runs)
+    below = across + ACROSS + BOTTOM
+    page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
+
+    table = Panel(page, (left, top, left + wide, top + height), box)
+    table.axes()
+    draw_workspace(table, plan.scene)
+    draw_endpoints(table, plan, Labels(table, what_is_drawn(plan, traces)))
+    for pose in runs.final[:MOST_DRAWN]:
+        draw_object(table, plan.scene, pose, Look(palette.SIMULATED, 0.35, opacity=0.22), 2)
+    cof = plan.scene.object.cof
+    paths = transform(runs.object[..., :3].reshape(-1, 3), cof).reshape(*runs.object.shape[:2], 2)
+    stretches = [tube_across(MM * paths[:, first:last]) for first, last in _stretches(paths)]
+    tubes = [tube for tube in stretches if tube is not None]
+    for middle, across_way, bands in tubes:
+        for low, high, opacity in bands:
+            a, b = middle + low[:, None] * across_way, middle + high[:, None] * across_way
+            table.area(np.concatenate([a, b[::-1]]), Look(fill=palette.SIMULATED, fill_opacity=opacity), 5)
+        table.line(middle, Look(palette.SIMULATED, 0.8), 7)
+
+    ends = Panel(page, (right, top + 14, PAGE - EDGE, top + height), ends_box(runs))
+    ends.axes(y="")
+    page.add(d.Text(right, top + 7, "ends of the drawing's origin", 8.0, SOFT, bold=True), 20)
+    _ends(ends, runs)
+    _width(page, (left, across, PAGE - EDGE, across + ACROSS), tubes)
+    return page
 
 
-def _stretches(paths: Array) -> list[tuple[int, int]]:
-    """Samples between which the runs move, one stretch from rest to rest."""
-    with np.errstate(invalid="ignore"):
-        moving = (
-            np.nan_to_num(np.nanmax(np.hypot(*np.moveaxis(np.diff(paths, axis=1), -1, 0)), axis=0)) > 1e-6
-        )
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))
-    return [(int(a), int(b) + 1) for a, b in edges.reshape(-1, 2)]
+Tube = tuple[Array, Array, list[tuple[Array, Array, float]]]
 
 
-def _band(axes: Any, paths: Array) -> None:
-    """Of one stretch, paths (n, m, 2) in mm."""
-    enough = np.count_nonzero(np.isfinite(paths[..., 0]), axis=0) >= min(_FEWEST, len(paths))
+def tube_across(paths: Array) -> Tube | None:
+    """The tube of one stretch of runs, paths (n, m, 2): its middle, the direction across, and the bands across it.
+
+    Returns:
+        Middle and unit vectors across it, to the left, shape (k, 2) each; and for each band the offsets of its right
+        and left border, shape (k,) each in the unit of the paths, with its opacity. None where too few runs are left.
+    """
+    enough = np.count_nonzero(np.isfinite(paths[..., 0]), axis=0) >= min(FEWEST, len(paths))
     paths = paths[:, enough]
     if paths.shape[1] < 2:
-        return
+        return None
     middle = np.nanmedian(paths, axis=0)
     ahead = np.gradient(middle, axis=0)
     size = np.linalg.norm(ahead, axis=1, keepdims=True)
     ahead = ahead / np.where(size > 0, size, 1.0)
     across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     offsets = np.einsum("nmi,mi->nm", paths - middle, across)
-    for low, high, opacity in _BANDS:
-        a, b = np.nanquantile(offsets, [low, high], axis=0)
-        ring = np.concatenate([middle + a[:, None] * across, (middle + b[:, None] * across)[::-1]])
-        axes.fill(*ring.T, facecolor=palette.SIMULATED, alpha=opacity, linewidth=0, zorder=5)
-    axes.plot(*middle.T, color=palette.SIMULATED, linewidth=1.0, zorder=7)
+    return middle, across, [(*np.nanquantile(offsets, [a, b], axis=0), opacity) for a, b, opacity in BANDS]
 
 
-def _ends(axes: Any, runs: Runs) -> None:
-    """Final positions, their mean and 95 % ellipse, the goal; ticks show how the object is turned."""
-    from matplotlib.patches import Ellipse
+def ends_box(runs: Runs) -> Box:
+    """What shows the ends, the goal and its tolerance [mm].
 
-    points, goal = MM * runs.final[:, :2], MM * runs.plan.scene.goal_pose[:2]
-    stuck = runs.sticking
-    length = 0.045 * float(np.ptp(axes.get_xlim()))
-    for some, colour in ((stuck, palette.PUSHES[0]), (np.logical_not(stuck), palette.SIMULATED)):
-        tips = points[some] + length * np.stack(
-            [np.cos(runs.final[some, 2]), np.sin(runs.final[some, 2])], axis=1
-        )
-        lines = np.stack([points[some], tips, np.full_like(tips, np.nan)], axis=1).reshape(-1, 2)
-        axes.plot(*lines.T, color=colour, linewidth=0.5, alpha=0.35, zorder=3)
-        axes.plot(*points[some].T, "o", color=colour, markersize=2.6, mew=0, alpha=0.6, zorder=4)
-    values, vectors = np.linalg.eigh(MM**2 * runs.covariance[:2, :2])
-    widths = 2 * np.sqrt(5.991 * np.maximum(values, 0))  # χ² of two degrees of freedom at 95 %
-    angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-    axes.add_patch(
-        Ellipse(
-            tuple(MM * runs.mean[:2]),
-            widths[1],
-            widths[0],
-            angle=angle,
-            fill=False,
-            edgecolor=INK,
-            lw=1.1,
-            zorder=6,
-        )
-    )
-    axes.plot(*(MM * runs.mean[:2]), "+", color=INK, markersize=9, mew=1.4, zorder=7)
-    axes.plot(*goal, "x", color=palette.GOAL, markersize=8, mew=2.0, zorder=8)
+    Every end, unless a few lie so far off that nothing could be told of the others: then 95 % of them in x and in y.
+    """
+    goal = MM * runs.plan.scene.goal_pose[:2]
+    tolerance = MM * np.array(runs.plan.scene.planning.goal_tolerance[:2])
+    ends = MM * runs.final[:, :2]
 
+    def around(points: Array) -> tuple[Array, Array]:
+        shown = np.concatenate([points, (goal - tolerance)[None], (goal + tolerance)[None]])
+        return shown.min(axis=0), shown.max(axis=0)
 
-def _wide_box(runs: Runs, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """What shows the plan and nineteen ends out of twenty."""
-    size = 0.6 * MM * runs.plan.scene.object.outline.size
-    low, high = (MM * np.quantile(runs.final[:, :2], q, axis=0) for q in (0.025, 0.975))
+    low, high = around(ends)
+    nearer = around(np.quantile(ends, [0.025, 0.975], axis=0))
+    if np.max(high - low) > FAR_OFF * np.max(nearer[1] - nearer[0]):
+        low, high = nearer
+    border = max(0.12 * float(np.max(high - low)), 0.05)
     return (
-        min(box[0], low[0] - size),
-        min(box[1], low[1] - size),
-        max(box[2], high[0] + size),
-        max(box[3], high[1] + size),
+        float(low[0] - border), float(low[1] - border), float(high[0] + border), float(high[1] + border),
+    )  # fmt: skip
+
+
+def _stretches(paths: Array) -> list[tuple[int, int]]:
+    """Samples between which the runs move, one stretch from rest to rest."""
+    with np.errstate(invalid="ignore"):
+        steps = np.hypot(*np.moveaxis(np.diff(paths, axis=1), -1, 0))
+        known = np.isfinite(steps).any(axis=0)
+        moving = np.where(known, np.max(np.nan_to_num(steps), axis=0), 0.0) > 1e-6
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))
+    return [(int(a), int(b) + 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _width(page: Drawing, frame: Box, tubes: list[Tube]) -> None:
+    """The bands over the way along the middle of the tube, at their own scale; a line where a push ends."""
+    start, rows = 0.0, []
+    for middle, _, bands in tubes:
+        way = start + np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
+        rows.append((way, bands))
+        start = float(way[-1])
+    most = max(
+        (float(np.max(np.abs([low, high]))) for _, bands in rows for low, high, _ in bands), default=0.0
     )
+    reach = 1.1 * max(most, 1e-3)
+    panel = Panel(page, frame, (0.0, -reach, max(start, 1e-3), reach), equal=False)
+    panel.axes("way of the centre of friction [mm]", "aside [mm]")
+    page.add(
+        d.Text(frame[0], frame[1] - 5, "how wide the tube is (+ left of its middle)", 8.0, SOFT, bold=True),
+        20,
+    )
+    for way, bands in rows:
+        for low, high, opacity in bands:
+            ring = np.stack([np.concatenate([way, way[::-1]]), np.concatenate([low, high[::-1]])], axis=1)
+            panel.area(ring, Look(fill=palette.SIMULATED, fill_opacity=opacity), 5)
+        panel.line(np.array([[way[0], 0.0], [way[-1], 0.0]]), Look(palette.SIMULATED, 0.8), 7)
+        panel.line(np.array([[way[-1], -reach], [way[-1], reach]]), Look(SOFT, 0.6, (2.0, 2.0)), 2)
 
 
-def _close_box(runs: Runs) -> tuple[float, float, float, float]:
-    goal = MM * runs.plan.scene.goal_pose[None, :2]
-    low, high = (MM * np.quantile(runs.final[:, :2], q, axis=0) for q in (0.01, 0.99))
-    points = np.concatenate([low[None], high[None], goal])
-    low, high = points.min(axis=0), points.max(axis=0)
-    border = max(0.15 * float(np.max(high - low)), 0.05)
-    return (low[0] - border, low[1] - border, high[0] + border, high[1] + border)
+def has_ellipse(runs: Runs) -> bool:
+    """Whether the ends spread in two directions, so that an ellipse stands for them."""
+    return len(runs) > 2 and float(np.linalg.eigvalsh(runs.covariance[:2, :2])[0]) > 1e-14
+
+
+def _ends(panel: Panel, runs: Runs) -> None:
+    """Final positions with ticks along O's x, their mean and 95 % ellipse, the goal with its tolerance."""
+    scene = runs.plan.scene
+    points, goal = MM * runs.final[:, :2], MM * scene.goal_pose[:2]
+    tick = panel.unit(5.0)
+    for some, colour in ((runs.sticking, STUCK), (np.logical_not(runs.sticking), SLIPPED)):
+        for point, angle in zip(points[some], runs.final[some, 2], strict=True):
+            tip = point + tick * np.array([np.cos(angle), np.sin(angle)])
+            panel.line(np.stack([point, tip]), Look(colour, 0.5, opacity=0.35), 3)
+            panel.disc(point, 1.4, Look(fill=colour, fill_opacity=0.6), 4)
+    x, y = MM * np.array(scene.planning.goal_tolerance[:2])
+    panel.area(goal + np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), TOLERANCE, 5)
+    if has_ellipse(runs):
+        values, vectors = np.linalg.eigh(MM**2 * runs.covariance[:2, :2])
+        angles = np.linspace(0, 2 * np.pi, 73)[:-1]
+        circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        ring = MM * runs.mean[:2] + (circle * np.sqrt(CHI_SQUARE * np.maximum(values, 0))) @ vectors.T
+        panel.area(ring, Look(INK, 1.1), 6)
+    outside = sum(not panel.holds(point) for point in points)
+    if outside:
+        corner = np.array([panel.box[2] - panel.unit(4.0), panel.box[1] + panel.unit(8.0)])
+        panel.text(corner, f"{outside} ends further off", SOFT, 7.5, "end")
+    _cross(panel, MM * runs.mean[:2], INK, 4.5, 0.0)
+    _cross(panel, goal, palette.GOAL, 4.0, np.pi / 4)
+
+
+def _cross(panel: Panel, centre: Array, colour: str, arm: float, turn: float) -> None:
+    """Two strokes of so many points from a drawn centre."""
+    for angle in (turn, turn + np.pi / 2):
+        step = panel.unit(arm) * np.array([np.cos(angle), np.sin(angle)])
+        panel.line(np.stack([centre - step, centre + step]), Look(colour, 1.5), 8)
+
+
+def _table_box(runs: Runs, box: Box) -> Box:
+    """What shows the plan and every end of the object."""
+    size = 0.6 * MM * runs.plan.scene.object.outline.size
+    low, high = (MM * f(runs.final[:, :2], axis=0) for f in (np.min, np.max))
+    return (
+        min(box[0], float(low[0]) - size),
+        min(box[1], float(low[1]) - size),
+        max(box[2], float(high[0]) + size),
+        max(box[3], float(high[1]) + size),
+    )
 
 
 def _subtitle(runs: Runs) -> str:
@@ -163,22 +232,20 @@ def _subtitle(runs: Runs) -> str:
     )
 
 
-def _legend(figure: Any) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    def dot(colour: str, label: str, **look: Any) -> Any:
-        return Line2D([], [], linestyle="", color=colour, label=label, **look)
-
-    legend_below(
-        figure,
-        [
-            Patch(facecolor=palette.SIMULATED, alpha=0.2, label="centre of friction, 95 % of the runs"),
-            Patch(facecolor=palette.SIMULATED, alpha=0.5, label="50 %"),
-            Line2D([], [], color=palette.SIMULATED, linewidth=0.6, alpha=0.6, label="ends of the object"),
-            dot(palette.PUSHES[0], "end of a run that stuck", marker="o", markersize=4),
-            dot(palette.SIMULATED, "end of a run that slipped", marker="o", markersize=4),
-            dot(INK, "mean and 95 % ellipse", marker="+", markersize=8),
-            dot(palette.GOAL, "goal", marker="x", markersize=7, mew=2.0),
-        ],
-    )
+def _legend(runs: Runs) -> list[Entry]:
+    red = palette.SIMULATED
+    entries = [
+        Entry("centre of friction, 95 % of the runs", Look(fill=red, fill_opacity=BANDS[0][2]), "box"),
+        Entry("50 % of the runs", Look(fill=red, fill_opacity=0.55), "box"),
+        Entry("ends of the object", Look(red, 0.6, opacity=0.6)),
+    ]
+    if np.any(runs.sticking):
+        entries.append(Entry("end of a run that stuck", Look(STUCK), "dot"))
+    if not np.all(runs.sticking):
+        entries.append(Entry("end of a run that slipped", Look(SLIPPED), "dot"))
+    entries.append(Entry("mean and 95 % ellipse" if has_ellipse(runs) else "mean (+)", Look(INK, 1.1)))
+    return [
+        *entries,
+        Entry("goal (×) and its tolerance", TOLERANCE),
+        Entry(words.GOAL, Look(palette.GOAL, 1.7)),
+    ]

@@ -1,38 +1,73 @@
-"""How figures put a plan into words: its title, its cost, its legend."""
+"""How figures and pages put a plan into words: its title, its cost, its pushes, what goes on."""
+
+import numpy as np
 
 from ..problem import Plan, PushSegment
 
+START, GOAL, BOTH = "start", "goal", "start = goal"
+FLAT_PATH = "path of the flat point"
+WAY = "way of the centre of friction so far"
+FINGERS = "fingers and their path"
+ALONE = "pusher alone (dotted: lifted)"
+CENTRE = "turning centre (+ left, − right)"
+FRICTION_CONE, MOTION_CONE = "friction cone", "motion cone in use"
+CONTACT, CONTROLLER = "contact", "controller"
+STICKS, SLIDES_LEFT, SLIDES_RIGHT = "sticks", "slides to the left", "slides to the right"
+OFF, RESTS = "off the object", "at rest"
+STRIP = "Where the fingers land on the object, in order"
+BOUNDS, OBSTACLE, TREE, SIMULATED = "bounds", "obstacle", "search tree", "simulated"
+
 
 def plan_title(plan: Plan) -> str:
-    """Object, number of pushes and their words."""
+    """What happens: the object, how many pushes, how far it goes, and how long that takes."""
     name = plan.scene.object.name
     if plan.status != "solved":
         return f"{name}: no plan"
     pushes = plan.pushes
     if not pushes:
         return f"{name}: nothing to push"
-    words = ", ".join(push.word or "–" for push in pushes)
-    return f"{name}: one push, {words}" if len(pushes) == 1 else f"{name}: {len(pushes)} pushes, {words}"
+    count = "one push" if len(pushes) == 1 else f"{len(pushes)} pushes"
+    return f"{name}: {count}, {length_text(travel(plan))}, {plan.duration:.0f} s"
 
 
 def plan_subtitle(plan: Plan) -> str:
-    """Cost and duration; without a plan the reason."""
+    """The cost and where it comes from; without a plan the reason."""
     if plan.status != "solved":
         return plan.reason or "no reason was recorded"
-    return f"cost {cost_text(plan)}, duration {plan.duration:.1f} s"
+    changes = max(len(plan.pushes) - 1, 0)
+    switching = plan.scene.planning.switching
+    text = f"cost {cost_text(plan)}"
+    if changes and switching > 0:
+        each = f"{switching:g} s" if plan.scene.planning.cost == "time" else f"{1e3 * switching:g} mm"
+        text += f", with {changes} change{'s' * (changes > 1)} of contact at {each}"
+    return text
 
 
 def cost_text(plan: Plan) -> str:
     """The cost with the unit that belongs to it."""
-    of = {"flat": "path of the flat point", "pusher": "path of the pusher", "time": "time"}[
-        plan.scene.planning.cost
-    ]
+    of = {"flat": FLAT_PATH, "pusher": "path of the pusher", "time": "time"}[plan.scene.planning.cost]
     number = f"{plan.cost:.1f} s" if plan.scene.planning.cost == "time" else f"{1e3 * plan.cost:.1f} mm"
     return f"{number} ({of})"
 
 
+def travel(plan: Plan) -> float:
+    """How far the centre of friction goes [m], arc by arc: |v + ω × p| is constant along an arc."""
+    x, y = plan.scene.object.cof
+    total = 0.0
+    for push in plan.pushes:
+        for arc in push.arcs:
+            vx, vy, w = (float(v) for v in arc.twist)
+            total += arc.duration * float(np.hypot(vx - w * y, vy + w * x))
+    return total
+
+
+def length_text(length: float) -> str:
+    """A length [m] in words: metres from 1 m up, else millimetres."""
+    return f"{length:.2f} m" if length >= 1 else f"{1e3 * length:.0f} mm"
+
+
 def push_label(number: int, push: PushSegment, several: bool) -> str:
-    """A push in the legend."""
+    """A push in a legend."""
     name = push.push if len(push.push) <= 32 else push.push[:31] + "…"
     text = f"push “{name}”, {push.word}"
     return f"{number + 1}: {text}" if several else text
