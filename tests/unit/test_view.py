@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flatpush.control.closed_loop import ClosedLoopRun
+from flatpush.control.loop.closed_loop import ClosedLoopRun
 from flatpush.errors import InputError
 from flatpush.geometry import Outline, compose, exp, inverse, transform
 from flatpush.problem import (
