@@ -38,6 +38,7 @@ _NAMES = {
     "Planner": "planning",
     "Planning": "problem",
     "PointContact": "contact",
+    "Proof": "simulation",
     "Push": "problem",
     "Pusher": "problem",
     "Quartic": "friction",
@@ -54,6 +55,7 @@ _NAMES = {
     "load_plan": "documents",
     "load_scene": "documents",
     "plan": "planning",
+    "prove": "simulation",
     "simulate": "simulation",
     "study": "simulation",
     "two_point_sticks": "contact",
@@ -82,6 +84,7 @@ __all__ = [
     "Planner",
     "Planning",
     "PointContact",
+    "Proof",
     "Push",
     "Pusher",
     "Quartic",
@@ -100,6 +103,7 @@ __all__ = [
     "load_plan",
     "load_scene",
     "plan",
+    "prove",
     "simulate",
     "study",
     "two_point_sticks",
@@ -134,7 +138,7 @@ if TYPE_CHECKING:
         Scene,
         Workspace,
     )
-    from .simulation import Claim, Noise, Perturbation, Report, Runs, simulate, study, verify
+    from .simulation import Claim, Noise, Perturbation, Proof, Report, Runs, prove, simulate, study, verify
     from .steering import dubins, flat_output
 
 

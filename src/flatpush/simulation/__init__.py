@@ -5,6 +5,7 @@ Nothing here imports steering or planning: a mistake there shows as a failed cla
 
 from .claims import certify, clearance_of
 from .noise import Noise
+from .proof import Proof, prove
 from .rollout import Perturbation, simulate
 from .study import Runs, study
 from .verify import Claim, Report, verify
@@ -13,10 +14,12 @@ __all__ = [
     "Claim",
     "Noise",
     "Perturbation",
+    "Proof",
     "Report",
     "Runs",
     "certify",
     "clearance_of",
+    "prove",
     "simulate",
     "study",
     "verify",

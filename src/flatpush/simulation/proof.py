@@ -1,0 +1,142 @@
+"""Whether a plan holds for every table of a set, and for how large a set it does."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..contact import PointContact, WrenchCone
+from ..contact.table_set import TableSet
+from ..errors import InputError
+from ..geometry import perpendicular, shift_twist
+from ..geometry.pose import Array
+from ..problem import Plan
+from ..problem.mechanics import contacts_of, named, placement_of
+
+# Normals of two contacts that differ by less stand on one straight side [rad].
+PARALLEL = 1e-9
+# The largest share of loads is found to this [parts of the nominal loads].
+RESOLVED = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Whether both fingers keep the object in every push of a plan, on every table of a set.
+
+    Attributes:
+        proved: whether they do.
+        margin: the least depth in the fingers' composite cone (see WrenchCone.depth), over all motions and tables.
+        loads: the largest share by which loads may differ at every point so that the plan still holds, with the same
+            friction and offset; 0 where it does not hold for the nominal loads.
+        push, arc: name of the push and number of its arc where the margin is least.
+        points, worst: feet or middles of patches in O, shape (n, 2) [m], and their loads on the worst table, (n,).
+    """
+
+    proved: bool
+    margin: float
+    loads: float
+    push: str
+    arc: int
+    points: Array
+    worst: Array
+
+
+def prove(plan: Plan, loads: float = 0.2, *, friction: float | None = None, offset: float = 0.0) -> Proof:
+    """Proves that the object stays in the hand during a plan, whatever the loads within a share of the nominal ones.
+
+    It is decided for all loads at once (see contact.table_set), not for drawn ones. Sticking under the least friction
+    of the fingers implies it for all more.
+
+    Args:
+        plan: solved, every push with two fingers.
+        loads: δ: pressure times table friction is within (1 ± δ) of its nominal value at every point; in [0, 1).
+        friction: the least Coulomb coefficient between fingertip and object; default: the object's.
+        offset: the fingers may stand so far along a straight side from where the plan wants them, either way [m].
+
+    Raises:
+        InputError: for a plan without a push, one finger, a known limit surface in the place of loads, an offset on a
+            side that is not straight, and numbers that make no sense.
+
+    >>> import flatpush as fp
+    >>> thing = fp.Object([(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)])
+    >>> push = fp.Push("side", thing.outline.nearest((0.0, -0.0175)), fingers=2, spacing=0.018)
+    >>> scene = fp.Scene(thing, (0.0, -0.1, 0.0), pusher=fp.Pusher(fingers=2, spacing=0.018), pushes=(push,))
+    >>> proof = prove(fp.plan(scene), 0.05)
+    >>> proof.proved, round(proof.loads, 2)
+    (True, 0.64)
+    """
+    scene = plan.scene
+    if not plan.pushes:
+        raise InputError("there is no push to prove in this plan", value=plan.status)
+    if scene.object.surface is not None:
+        raise InputError(
+            "a known limit surface has no loads that could differ",
+            key="object.surface",
+            hint="Give the support instead.",
+        )
+    mu = scene.object.friction if friction is None else friction
+    if isinstance(mu, bool) or not 0 < mu <= scene.object.friction:
+        raise InputError(
+            f"the least friction is above 0 and at most the object's ({scene.object.friction:g})",
+            key="friction", value=mu,
+        )  # fmt: skip
+    if not (np.isfinite(offset) and offset >= 0):
+        raise InputError("an offset is a finite length, 0 or more", key="offset", value=offset)
+    tables = TableSet.of(scene.object.support, loads)
+    found: list[tuple[WrenchCone, Array, str, int]] = []
+    for segment in plan.pushes:
+        if len(segment.fingers) != 2:
+            raise InputError(
+                "only pushes of two fingers hold for a set of tables", key=f"push {segment.push!r}",
+                value=len(segment.fingers), hint="One finger needs feedback: flatpush track.",
+            )  # fmt: skip
+        contacts = contacts_of(scene, placement_of(scene, named(scene, segment.push)))
+        for cone in _cones(contacts, float(mu), offset, segment.push):
+            found += [
+                (cone, shift_twist(arc.twist, scene.object.cof), segment.push, i)
+                for i, arc in enumerate(segment.arcs)
+                if arc.duration > 0
+            ]
+    margins = [float(tables.margin(cone, twist)) for cone, twist, _, _ in found]
+    worst = int(np.argmin(margins))
+    cone, twist, push, number = found[worst]
+    return Proof(
+        margins[worst] >= 0,
+        margins[worst],
+        _largest(tables, [(c, V) for c, V, _, _ in found]),
+        push,
+        number,
+        tables.points + scene.object.cof,
+        tables.worst(cone, twist).loads,
+    )
+
+
+def _cones(contacts: tuple[PointContact, ...], mu: float, offset: float, push: str) -> list[WrenchCone]:
+    """Of the fingers in the extreme places that they may have along their side."""
+    a, b = (replace(c, friction=mu) for c in contacts)
+    if offset == 0:
+        return [WrenchCone.of((a, b))]
+    along = perpendicular(a.normal)
+    if abs(float(a.normal @ b.normal) - 1) > PARALLEL or abs(float((b.point - a.point) @ a.normal)) > 1e-9:
+        raise InputError(
+            "an offset needs two fingers on one straight side", key=f"push {push!r}", value=offset
+        )
+    return [
+        WrenchCone.of([replace(c, point=c.point + s * offset * along) for c in (a, b)])
+        for s in (-1.0, 0.0, 1.0)
+    ]
+
+
+def _largest(tables: TableSet, motions: list[tuple[WrenchCone, Array]]) -> float:
+    """By bisection: the margin falls as the set grows."""
+
+    def holds(share: float) -> bool:
+        grown = replace(tables, share=share)
+        return all(float(grown.margin(cone, twist)) >= 0 for cone, twist in motions)
+
+    low, high = 0.0, 1.0 - RESOLVED
+    if not holds(low) or holds(high):
+        return low if not holds(low) else high
+    while high - low > RESOLVED:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low

@@ -1,0 +1,88 @@
+"""Plans that are proved for a set of tables, rolled out in the plant on tables of the set."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.geometry import pose_error
+
+RECTANGLE = [(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)]
+FEET = [(-0.018, -0.012), (0.02, -0.01), (0.004, 0.014), (-0.02, 0.008)]
+PUSHER = fp.Pusher(fingers=2, spacing=0.018)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    thing = fp.Object(RECTANGLE, fp.Support.points(FEET, [1, 1.2, 1, 0.8]), friction=0.4)
+    push = fp.Push("side", thing.outline.nearest((0.0, -0.0175)), fingers=2, spacing=0.018)
+    return fp.plan(fp.Scene(thing, (0.05, -0.12, 0.8), pusher=PUSHER, pushes=(push,)))
+
+
+def on(plan, weights):
+    """The plan on another table."""
+    thing = replace(plan.scene.object, support=fp.Support.points(FEET, weights))
+    return fp.simulate(replace(plan, scene=replace(plan.scene, object=thing)), seed=None)
+
+
+def corners(weights, share):
+    """The loads at the corners of the set, as the ends of all ranges but one that makes the sum right."""
+    for signs in product((-1, 1), repeat=3):
+        for k in range(4):
+            loads = weights * (1 + share * np.insert(np.array(signs, dtype=float), k, 0))
+            loads[k] += weights.sum() - loads.sum()
+            if abs(loads[k] - weights[k]) <= share * weights[k] + 1e-12:
+                yield loads
+
+
+def test_on_no_table_of_a_proved_set_does_anything_slide(plan):
+    found = fp.prove(plan, 0.0)
+    share = 0.999 * found.loads
+    assert fp.prove(plan, share).proved
+    assert share > 0.02
+    _, weights = plan.scene.object.support.feet
+    end = on(plan, weights).final_pose
+    tables = list(corners(weights, share))
+    assert len(tables) >= 6
+    for loads in tables:
+        run = on(plan, loads)
+        assert not [mode for mode in run.modes if mode.startswith("sliding")]
+        assert pose_error(run.final_pose, end) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_the_worst_table_slips_as_soon_as_the_set_is_larger(plan):
+    """The largest share is not only safe but true: just beyond it the table that is named lets the object slide."""
+    share = 1.05 * fp.prove(plan, 0.0).loads + 0.01
+    found = fp.prove(plan, share)
+    assert not found.proved
+    assert found.worst.sum() == pytest.approx(1)
+    run = on(plan, found.worst)
+    assert any(mode.startswith("sliding") for mode in run.modes)
+
+
+def test_less_friction_and_a_grasp_that_is_off_leave_less(plan):
+    whole = fp.prove(plan, 0.0).loads
+    assert fp.prove(plan, 0.0, friction=0.36).loads < whole
+    assert fp.prove(plan, 0.0, offset=0.004).loads < whole
+    assert fp.prove(plan, 0.1).margin < fp.prove(plan, 0.05).margin
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"loads": 1.0}, "less than 1"),
+        ({"loads": float("nan")}, "less than 1"),
+        ({"friction": 0.5}, "at most the object's"),
+        ({"offset": -0.001}, "0 or more"),
+    ],
+)
+def test_sets_that_are_none(plan, options, message):
+    with pytest.raises(fp.InputError, match=message):
+        fp.prove(plan, **options)
+
+
+def test_one_finger_is_never_proved(one_finger_plan):
+    with pytest.raises(fp.InputError, match="two fingers"):
+        fp.prove(one_finger_plan)
