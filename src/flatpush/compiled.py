@@ -1,16 +1,32 @@
-"""The one door to numba: how a kernel is compiled, and where what was compiled is kept.
+"""The one door to numba: how a kernel is compiled, and by what it is recognised when it was compiled before.
 
 Nothing else imports numba, and kernel files are imported only when they are needed, so that reading a file, printing
 help or drawing never pays for a compiler.
+
+numba's own cache knows a kernel by its file alone: it does not notice that a function in another file changed, dies of
+a damaged file and needs a folder that it can write. Here a kernel is known by what it computes: its code, that of every
+function it calls, wherever they stand, and the constants they read. Comments and other functions of a file do not
+count. Where compiled kernels are kept: kernel_store.py.
 """
 
-from collections.abc import Callable
+import enum
+import hashlib
+import pickle
+import platform
+from collections.abc import Callable, Iterator
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
+import llvmlite
 import numba as nb
-from llvmlite import binding, ir  # type: ignore[import-untyped]
-from numba.core import types
+import numpy as np
+from llvmlite import binding, ir
+from numba.core import caching, compiler, event, serialize, sigutils, types
+from numba.core.ccallback import CFunc
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
+
+from . import compiling, kernel_store
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -27,7 +43,17 @@ def kernel(signature: object = None, *, fused: bool = False) -> Callable[[F], F]
     With a signature it is compiled (or read from disk) when its module is imported, without one when it is called.
     """
     options = _PLAIN | (_FUSED if fused else {})
-    return nb.njit(signature, cache=True, nogil=True, **options)
+
+    def decorate(function: F) -> F:
+        made = nb.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+        if isinstance(made, Dispatcher):  # NUMBA_DISABLE_JIT leaves functions as they are
+            made._cache = _Kept(made)  # type: ignore[attr-defined]
+            if signature is not None:
+                made.compile(signature)
+                made.disable_compile()
+        return made
+
+    return decorate
 
 
 def inner(function: F) -> F:
@@ -53,7 +79,9 @@ def shared(returns: object, *examples: object) -> Callable[[F], F]:
 
     def decorated(function: F) -> F:
         signature = nb.typeof(returns)(*(nb.typeof(example) for example in examples))
-        made = nb.cfunc(signature, cache=True, **_PLAIN)(function)
+        made = _Shared(function, (signature.args, signature.return_type), locals={}, options=_PLAIN)
+        made._cache = _Kept(made)  # type: ignore[attr-defined]
+        made.compile()
         symbol = f"{function.__module__}.{function.__qualname__}"
         binding.add_symbol(symbol, made.address)
 
@@ -76,6 +104,162 @@ def shared(returns: object, *examples: object) -> Callable[[F], F]:
 
         found = intrinsic(call)
         found.made = made  # its code must outlive its callers
+        found.symbol = symbol, signature
         return found
 
     return decorated
+
+
+class _Shared(CFunc):
+    """A function that is compiled by itself; who listens hears of it as of a kernel."""
+
+    def _compile_uncached(self) -> Any:
+        _begin(self)
+        try:
+            return super()._compile_uncached()  # type: ignore[misc]
+        finally:
+            compiling.end()
+
+
+class _Kept(caching.NullCache):
+    """What a compiled function asks before it compiles and tells when it has, once for each set of argument types."""
+
+    def __init__(self, compiled: Any) -> None:
+        self._compiled = compiled  # a Dispatcher or a CFunc
+
+    @property
+    def cache_path(self) -> str:
+        return str(kernel_store.folder())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        compiling.begin("", 0, quiet=True)
+        try:
+            name = self._name(sig, target_context.codegen())
+            data = kernel_store.load(name)
+            if data is None:
+                return None
+            try:
+                return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+            except Exception:  # another version wrote it: whatever it is that fails, it is compiled again
+                kernel_store.discard(name)
+                return None
+        finally:
+            compiling.end()
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        if not data._asdict()["library"].has_dynamic_globals:
+            compiling.begin("", 0, quiet=True)
+            try:
+                kernel_store.save(self._name(sig, data.codegen), serialize.dumps(data._reduce()))
+            finally:
+                compiling.end()
+
+    def _name(self, sig: Any, codegen: Any) -> str:
+        """Name of the file for a signature, readable at its beginning."""
+        arguments, _ = sigutils.normalize_signature(sig)
+        versions = nb.__version__, llvmlite.__version__, platform.python_version(), codegen.magic_tuple()
+        key = hashlib.sha256(repr((versions, *map(_spelled, arguments))).encode())
+        key.update(_meaning(self._compiled))
+        return f"{self._compiled.__name__}-{type(self._compiled).__name__}-{key.hexdigest()[:32]}"
+
+
+def _spelled(kind: Any) -> str:
+    """A type of an argument in full: numba's own text leaves out what the fields of a named tuple are called."""
+    fields = getattr(kind, "fields", ())
+    return f"{kind}{fields if isinstance(fields, tuple) else ''}" + "".join(
+        map(_spelled, getattr(kind, "types", ()) or ())
+    )
+
+
+_meanings: dict[Any, bytes] = {}
+
+
+def _meaning(function: Any) -> bytes:
+    """Digest of what a function computes: its code, what it calls, what it reads. A recursive call adds nothing."""
+    if function not in _meanings:
+        _meanings[function] = b""
+        plain = getattr(function, "__wrapped__", function)
+        digest = hashlib.sha256(repr(getattr(function, "targetoptions", "")).encode())
+        digest.update(repr(list(_code(plain.__code__))).encode())
+        for name, value in _read(plain):
+            digest.update(name.encode() + _value(value))
+        for cell in plain.__closure__ or ():
+            digest.update(_value(cell.cell_contents))
+        _meanings[function] = digest.digest()
+    return _meanings[function]
+
+
+def _code(code: CodeType) -> Iterator[object]:
+    yield from (code.co_code, code.co_names, code.co_varnames, code.co_freevars)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _code(constant)
+        else:
+            yield constant
+
+
+def _names(code: CodeType) -> set[str]:
+    inside = (_names(constant) for constant in code.co_consts if isinstance(constant, CodeType))
+    return set(code.co_names).union(*inside)
+
+
+def _read(function: FunctionType) -> list[tuple[str, object]]:
+    """The global names that a function may read, with their values; of our own modules, what is read of them."""
+    names, found = _names(function.__code__), []
+    for name in sorted(names):
+        value = function.__globals__.get(name)
+        if isinstance(value, ModuleType) and value.__name__.startswith("flatpush"):
+            found += [(f"{name}.{n}", vars(value)[n]) for n in sorted(names) if n in vars(value)]
+        elif name in function.__globals__:
+            found.append((name, value))
+    return found
+
+
+def _value(value: Any) -> bytes:
+    if isinstance(value, Dispatcher | FunctionType):
+        return _meaning(value)
+    if hasattr(value, "symbol"):  # of a shared function only its address is known to who calls it
+        return repr(value.symbol).encode()
+    if isinstance(value, np.ndarray):
+        return repr((value.dtype, value.shape)).encode() + value.tobytes()
+    if isinstance(value, type):
+        members = list(value.__members__.items()) if issubclass(value, enum.Enum) else ()
+        return repr((value.__qualname__, getattr(value, "_fields", ()), members)).encode()
+    if isinstance(value, ModuleType):
+        return value.__name__.encode()
+    if isinstance(value, tuple | list):
+        return repr(type(value)).encode() + b"".join(map(_value, value))
+    known = isinstance(value, int | float | complex | str | bytes | np.generic | np.dtype | None)
+    return repr(value).encode() if known or isinstance(value, nb.types.Type) else repr(type(value)).encode()
+
+
+def _begin(function: Any) -> None:
+    plain = function.__wrapped__
+    needed = 0
+    if not compiling.busy():
+        needed = sum(not isinstance(f, Dispatcher) or not f.overloads for f in _needs(function))
+    compiling.begin(f"{plain.__module__.removeprefix('flatpush.')}.{plain.__name__}", needed)
+
+
+def _needs(function: Any, seen: set[Any] | None = None) -> set[Any]:
+    """The compiled functions that one calls, directly or not, itself included."""
+    seen = set() if seen is None else seen
+    if isinstance(function, Dispatcher | CFunc) and function not in seen:
+        seen.add(function)
+        for _, value in _read(function.__wrapped__):  # type: ignore[union-attr]
+            _needs(value, seen)
+    return seen
+
+
+class _Watch(event.Listener):
+    """Passes on when the compiler begins and ends."""
+
+    def on_start(self, event: Any) -> None:
+        _begin(event.data["dispatcher"])
+
+    def on_end(self, event: Any) -> None:
+        compiling.end()
+
+
+event.register("numba:compile", _Watch())

@@ -8,8 +8,10 @@ import warnings
 
 import typer
 
+from .. import compiling
 from ..errors import FlatpushError
 from . import describe, experiment, export, identify, init, plan, simulate, track, verify
+from .common import CompilingNotice
 
 app = typer.Typer(
     name="flatpush",
@@ -51,6 +53,7 @@ def _options(
 def main() -> None:
     """Runs a command; an error is one message on standard error, without a traceback."""
     warnings.showwarning = _show_warning
+    compiling.listen(CompilingNotice(sys.stderr))
     try:
         status = app(standalone_mode=False)
     except typer.Abort:

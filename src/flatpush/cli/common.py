@@ -3,12 +3,14 @@
 import json
 import math
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TextIO
 
 import typer
 
+from .. import compiling
 from ..errors import InputError
 
 
@@ -59,11 +61,65 @@ def print_json(value: Any) -> None:
 
 @contextmanager
 def telling(what: str, after: float = 1.0) -> Iterator[None]:
-    """Says on standard error what is being done, if it takes longer than a second."""
-    timer = threading.Timer(after, lambda: typer.echo(f"{what} …", err=True))
-    timer.daemon = True
-    timer.start()
+    """Says on standard error what is being done, if it takes longer than a second; compiling does not count."""
+    over, began = threading.Event(), compiling.clock()
+
+    def wait() -> None:
+        while not over.wait(0.1):
+            if compiling.clock() - began > after:
+                typer.echo(f"{what} …", err=True)
+                return
+
+    threading.Thread(target=wait, daemon=True).start()
     try:
         yield
     finally:
-        timer.cancel()
+        over.set()
+
+
+class CompilingNotice:
+    """Tells who waits what is being compiled: on a terminal in a line that is rewritten, elsewhere once.
+
+    Args:
+        stream: standard error.
+        period: the terminal's line is rewritten so often [s]; what is ready earlier is not mentioned.
+    """
+
+    def __init__(self, stream: TextIO, period: float = 0.5) -> None:
+        self._stream, self._period = stream, period
+        self._live = stream.isatty()
+        self._work: compiling.Work | None = None
+        self._began: float | None = None
+
+    def __call__(self, work: compiling.Work) -> None:
+        first, self._work = self._began is None, None if work.over else work
+        if first:
+            self._began = time.perf_counter()
+            if self._live:
+                threading.Thread(target=self._keep_writing, daemon=True).start()
+            else:
+                self._stream.write(
+                    f"compiling {work.kernel} and what else is needed, once on this machine …\n"
+                )
+                self._stream.flush()
+
+    def _keep_writing(self) -> None:
+        written = False
+        while True:
+            time.sleep(self._period)
+            work = self._work
+            if work is not None:
+                self._stream.write(f"\r\033[K{self.line(work)}")
+            elif written:
+                self._stream.write("\r\033[K")
+            written = work is not None
+            self._stream.flush()
+
+    def line(self, work: compiling.Work) -> str:
+        """What, a bar, how many of how many functions, and for how long in all."""
+        filled = round(20 * work.done / max(work.of, 1))
+        seconds = time.perf_counter() - (self._began or time.perf_counter())
+        bar = "█" * filled + "·" * (20 - filled)
+        return (
+            f"compiling {work.kernel} {bar} {work.done} of {work.of}, {seconds:.0f} s (once on this machine)"
+        )

@@ -111,7 +111,7 @@ def _planned(scene: Any, tree: Path | None) -> tuple[Any, Any]:
         sys.stderr.flush()
 
     try:
-        with telling("planning (the first run compiles for some seconds)"):
+        with telling("planning"):
             planner = Planner(scene, tree or False, progress if live else None)
             for answer in planner.answers():
                 best = answer
