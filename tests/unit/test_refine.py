@@ -8,11 +8,11 @@ import pytest
 from flatpush.errors import InputError
 from flatpush.geometry import compose, exp, pose_error, rotate
 from flatpush.planning.refine import improvements, refine
-from flatpush.planning.refine.kernels import leg, price
 from flatpush.planning.refine.pool import arc_seeds, pool_seeds, sample_poses
 from flatpush.planning.refine.problem import Query
 from flatpush.steering import three_twist
 from flatpush.steering.fleet import Fleet
+from flatpush.steering.six_words import MOST_WORDS, WORD, every_word
 
 GOAL = np.zeros(3)
 SENSE = {"L": 0, "S": 1, "R": 2}
@@ -44,18 +44,20 @@ def random_poses(rng, count):
     return rng.uniform(-1, 1, (count, 3)) * [0.12, 0.12, np.pi]
 
 
+def plain_time(way, v, a):
+    """A way at the cost of itself (infinite speed), or from rest to rest: the area under a trapezoid or triangle."""
+    if np.isinf(v) or way == 0:
+        return way
+    return way / v + v / a if way >= v * v / a else 2 * np.sqrt(way / a)
+
+
 def plain_leg(fleet, push, start, goal):
     """The cheapest word, priced arc by arc; three_twist enumerates the words."""
     words = three_twist.words(fleet.left[push], fleet.right[push], fleet.direction[push], start, goal)
 
     def cost(letter, amount):
-        way = fleet.rates[push, SENSE[letter]] * amount
-        v, a = fleet.speeds[push, SENSE[letter]], fleet.accelerations[push, SENSE[letter]]
-        if np.isinf(v):
-            return way
-        if way == 0:
-            return 0.0
-        return way / v + v / a if way >= v * v / a else 2 * np.sqrt(way / a)
+        k = SENSE[letter]
+        return plain_time(fleet.rates[push, k] * amount, fleet.speeds[push, k], fleet.accelerations[push, k])
 
     return min(sum(cost(k, p) for k, p in zip(w.word, w.parameters, strict=True)) for w in words)
 
@@ -69,26 +71,50 @@ def plain_cost(fleet, plan):
 def test_a_leg_costs_what_the_plain_words_cost(kind):
     fleet, rng = KINDS[kind], np.random.default_rng(1)
     query = Query.of(fleet, GOAL, GOAL, 0.0)
-    arcs = np.empty((3, 2))
     for start, goal in zip(random_poses(rng, 60), random_poses(rng, 60), strict=True):
         push = int(rng.integers(fleet.size))
-        cost = leg(query.cars[push], query.laws[push], start, goal, arcs)
-        assert cost == pytest.approx(plain_leg(fleet, push, start, goal), rel=1e-9)
-        assert cost == pytest.approx(sum(price(query.laws[push, int(k)], x) for k, x in arcs), rel=1e-12)
+        cost, (word,) = query.chain(np.array([push]), np.array([start, goal]))
+        assert cost == word["cost"] == pytest.approx(plain_leg(fleet, push, start, goal), rel=1e-9)
+        amounts = dict(zip("LSR", np.zeros(3), strict=True))
+        for letter, amount in zip(word["letter"], word["amount"], strict=True):
+            amounts["LSR"[letter]] += amount
+        flat = amounts["S"] + fleet.radius[push] * (amounts["L"] + amounts["R"])
+        assert word["flat"] == pytest.approx(flat, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_word_is_found_with_its_price(kind):
+    """As three_twist lists them: names, amounts, prices, cheapest first; each ends at the goal when it is driven."""
+    fleet, rng = KINDS[kind], np.random.default_rng(9)
+    found = np.zeros(MOST_WORDS, WORD)
+    for start, goal in zip(random_poses(rng, 30), random_poses(rng, 30), strict=True):
+        count = every_word(fleet.cars, 1, start, goal, found)
+        plain = three_twist.words(fleet.left[1], fleet.right[1], fleet.direction[1], start, goal)
+        assert count == len(plain)
+        assert np.all(np.diff(found["cost"][:count]) >= 0)
+        for word in found[:count]:
+            name = "".join("LSR"[letter] for letter in word["letter"])
+            ways = fleet.rates[1, word["letter"]] * word["amount"]
+            cost = sum(
+                plain_time(w, fleet.speeds[1, k], fleet.accelerations[1, k])
+                for w, k in zip(ways, word["letter"], strict=True)
+            )
+            assert word["cost"] == pytest.approx(cost, rel=1e-12)
+            same = [w for w in plain if w.word == name]
+            assert min(np.abs(w.parameters - word["amount"]).max() for w in same) < 1e-8
 
 
 def test_a_leg_of_one_arc_has_no_spurious_turn():
     """The ends of good plans' legs are met by fewer arcs than three, and rounding then makes arcs of -1e-17."""
     fleet = KINDS["general"]
     query = Query.of(fleet, GOAL, GOAL, 0.0)
-    arcs = np.empty((3, 2))
     rng = np.random.default_rng(0)
     for start in random_poses(rng, 100):
         amount = rng.uniform(0.05, 1.5)
         for motion, centre in ((0, fleet.left[1]), (2, fleet.right[1])):
             sense = 1 - motion
             end = compose(start, exp(sense * amount * np.array([centre[1], -centre[0], 1.0])))
-            cost = leg(query.cars[1], query.laws[1], start, end, arcs)
+            cost, _ = query.chain(np.array([1]), np.array([start, end]))
             assert cost <= amount * fleet.rates[1, motion] + 1e-9
 
 

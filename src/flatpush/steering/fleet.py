@@ -2,11 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..geometry.pose import Array
 from .car import Car
+
+if TYPE_CHECKING:
+    from .six_words import Records
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,18 @@ class Fleet:
             np.full((k, 3), np.inf) if accelerations is None else np.asarray(accelerations, dtype=float),
             np.where(np.eye(k) > 0, 0.0, cost) if cost.ndim == 0 else cost,
         )
+
+    @property
+    def cars(self) -> "Records":
+        """The cars as the compiled kernels take them: a record array of six_words.CAR, shape (k,)."""
+        from .six_words import CAR
+
+        cars = np.zeros(self.size, CAR)
+        for at, (x, y) in (("left", self.left.T), ("right", self.right.T), ("ahead", self.direction.T)):
+            cars[f"{at}_x"], cars[f"{at}_y"] = x, y
+        cars["radius"], cars["rate"] = self.radius, self.rates
+        cars["speed"], cars["acceleration"] = self.speeds, self.accelerations
+        return cars
 
     @property
     def size(self) -> int:

@@ -101,24 +101,25 @@ def arc_seeds(query: Query, rng: np.random.Generator, plain: bool) -> list[Candi
 
     Where the best plan has as few arcs as there are equations it is isolated, and a descent hardly finds it.
     """
-    from .kernels import three_arcs
+    from .three_arcs import three_arcs
 
     fleet, k = query.fleet, query.fleet.size
+    switching = np.ascontiguousarray(fleet.switching, dtype=float)
     prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
     pushes = rng.integers(k, size=prefixes)
     starts = compose(query.start, exp(_arcs(query, rng, pushes)))
     found: list[tuple[float, tuple[int, ...], Array]] = []
-    costs, poses = np.empty((k, k, k)), np.empty((k, k, k, 2, 3))
+    costs, poses = np.empty(k**3), np.empty((k**3, 2, 3))
     for prefix in range(-1 if plain else 0, prefixes):
         first: tuple[int, ...] = () if prefix < 0 else (int(pushes[prefix]),)
         start = query.start if prefix < 0 else starts[prefix]
         before = 0.0 if prefix < 0 else query.candidate(pushes[[prefix]], np.array([query.start, start])).cost
-        three_arcs(query.cars, query.laws, fleet.switching, start, query.goal, costs, poses)
-        for flat in np.argsort(costs, axis=None)[: ARC_SEEDS if prefix < 0 else 4]:
-            i, j, h = flat // (k * k), flat // k % k, flat % k
-            cost = before + costs[i, j, h] + (fleet.switching[first[0], i] if first else 0.0)
+        three_arcs(query.cars, switching, start, query.goal, costs, poses)
+        for triple in np.argsort(costs)[: ARC_SEEDS if prefix < 0 else 4]:
+            i, j, h = triple // (k * k), triple // k % k, triple % k
+            cost = before + costs[triple] + (fleet.switching[first[0], i] if first else 0.0)
             if np.isfinite(cost):
-                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[i, j, h]])
+                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[triple]])
                 found.append((float(cost), (*first, int(i), int(j), int(h)), via))
     found.sort(key=lambda plan: plan[0])
     seeds: dict[tuple[int, ...], Candidate] = {}

@@ -1,4 +1,4 @@
-"""A query as the refinement sees it: the fleet as compiled arrays, the two ends, what a sequence of pushes costs."""
+"""A query as the refinement sees it: the fleet as records, the two ends, what a sequence of pushes costs."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,11 @@ import numpy as np
 from ...geometry.pose import Array
 from ...steering import dubins
 from ...steering.fleet import Fleet
+from ...steering.six_words import WORD, Records, chain_cost
+from .descent import Work, descend
 
 OFFSET, OFFSET_ANGLE = 2e-4, np.deg2rad(0.2)  # of the switch poses, for the cost of replanning [m, rad]
-SETTLING = 4e-3 * 0.5 ** np.arange(7)  # steps of settle [m, and radii for the angle]
+SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,42 +41,32 @@ class Query:
     start: Array
     goal: Array
     least: float
-    cars: Array
-    laws: Array
+    cars: Records
     offsets: Array
     flat: bool
 
     @classmethod
     def of(cls, fleet: Fleet, start: Array, goal: Array, least: float) -> "Query":
-        cars = np.column_stack([fleet.left, fleet.right, fleet.direction, fleet.radius])
-        laws = np.stack([fleet.rates, fleet.speeds, fleet.accelerations], axis=-1)
         around = np.arange(8) * (np.pi / 4)
         ring = np.column_stack([OFFSET * np.cos(around), OFFSET * np.sin(around)])
         signs = np.repeat([OFFSET_ANGLE, -OFFSET_ANGLE], 8)
         offsets = np.column_stack([np.tile(ring, (2, 1)), signs])
-        return cls(
-            fleet,
-            start,
-            goal,
-            least,
-            np.ascontiguousarray(cars),
-            np.ascontiguousarray(laws),
-            offsets,
-            fleet.is_dubins,
-        )
+        return cls(fleet, start, goal, least, fleet.cars, offsets, fleet.is_dubins)
 
     def switching(self, pushes: np.ndarray) -> float:
         return float(np.sum(self.fleet.switching[pushes[:-1], pushes[1:]]))
 
+    def chain(self, pushes: np.ndarray, poses: Array) -> tuple[float, Records]:
+        """Cost of the legs between poses without switching, and their words, records of six_words.WORD, shape (n,)."""
+        words = np.zeros(len(pushes), WORD)
+        return chain_cost(self.cars, pushes, poses, words), words
+
     def candidate(self, pushes: np.ndarray, poses: Array) -> Candidate:
         """The cost of a sequence as it is; infinite if a leg is too short."""
-        from .kernels import chain_cost, shortest_flat
-
-        legs = np.empty((len(pushes), 3, 2))
-        cost = chain_cost(self.cars, self.laws, pushes, poses, legs) + self.switching(pushes)
-        if len(pushes) > 1 and shortest_flat(self.cars, pushes, legs) < self.least * (1 - 1e-6):
+        cost, words = self.chain(pushes, poses)
+        if len(pushes) > 1 and words["flat"].min() < self.least * (1 - 1e-6):
             cost = np.inf
-        return Candidate(float(cost), pushes, poses)
+        return Candidate(cost + self.switching(pushes), pushes, poses)
 
     def merged(self, pushes: np.ndarray, poses: Array) -> Candidate:
         """The same, equal neighbours being joined to one leg."""
@@ -82,14 +74,6 @@ class Query:
         return self.candidate(
             np.delete(pushes, same), np.ascontiguousarray(np.delete(poses, same + 1, axis=0))
         )
-
-    def arcs(self, found: Candidate) -> Array:
-        """Rows (letter, amount) of every leg, shape (n, 3, 2); letters 0 left, 1 straight, 2 right."""
-        from .kernels import chain_cost
-
-        legs = np.empty((len(found.pushes), 3, 2))
-        chain_cost(self.cars, self.laws, found.pushes, found.poses, legs)
-        return legs
 
     def direct(self) -> Candidate:
         """The best single push."""
@@ -100,29 +84,42 @@ class Query:
         )
 
     def descend(self, found: Candidate, repeats: int, steps: int) -> Candidate:
-        """The sequence with its switch poses moved downhill."""
-        from .descent.kernels import descend
-
-        poses = found.poses.copy()
-        cost = descend(self.cars, self.laws, found.pushes, poses, self.least, repeats, steps)
-        return Candidate(float(cost) + self.switching(found.pushes), found.pushes, poses)
+        """The sequence with its switch poses moved downhill; infinite if a leg stays too short (a single one may)."""
+        pushes, poses, best = found.pushes, found.poses, np.inf
+        here = poses.copy()
+        for repeat in range(repeats + 1):
+            cost, words = self.chain(pushes, here)
+            if cost == np.inf:
+                break
+            better = cost < best - 1e-7 * cost
+            if cost < best and words["flat"].min() >= self.least * (1.0 - 1e-9):
+                best, poses = cost, here.copy()
+            if repeat == repeats or (best < np.inf and not better):
+                break
+            work = Work.of(words, here, self.least, float(self.fleet.radius[pushes[0]]))
+            if not descend(work, self.cars, pushes, words, here, steps):
+                break
+        return Candidate(best + self.switching(pushes), pushes, poses)
 
     def replanning(self, found: Candidate) -> float:
         """Mean cost when every leg but the first starts OFFSET and OFFSET_ANGLE off, over sixteen fixed displacements.
 
         The leg is planned again from there to where it was to end.
         """
-        from .kernels import offsets_cost
-
-        cost = offsets_cost(self.cars, self.laws, found.pushes, found.poses, self.offsets)
-        return float(cost) + self.switching(found.pushes)
+        pushes, poses = found.pushes, found.poses
+        total = self.chain(pushes[:1], poses[:2])[0] + self.switching(pushes)
+        for i in range(1, len(pushes)):
+            for offset in self.offsets:
+                ends = np.array([poses[i] + offset, poses[i + 1]])
+                total += self.chain(pushes[i : i + 1], ends)[0] / len(self.offsets)
+        return total
 
     def settle(self, found: Candidate) -> Candidate:
         """The sequence moved to where replanning costs least nearby."""
-        from .kernels import settle
+        from .replanning import settle
 
-        poses = found.poses.copy()
-        settle(self.cars, self.laws, found.pushes, poses, self.offsets, self.least, SETTLING)
+        poses, words = found.poses.copy(), np.zeros(len(found.pushes), WORD)
+        settle(self.cars, found.pushes, poses, self.offsets, self.least, SETTLING, words)
         return self.candidate(found.pushes, poses)
 
     def table(self, starts: Array, goals: Array) -> Array:
@@ -137,11 +134,9 @@ class Query:
                     for k in range(fleet.size)
                 ]
             )
-        from .kernels import leg_table
+        from ...steering.lengths import fleet_lengths
 
-        costs = np.empty((fleet.size, len(starts), len(goals)))
-        leg_table(self.cars, self.laws, np.ascontiguousarray(starts), np.ascontiguousarray(goals), costs)
-        return costs
+        return fleet_lengths(fleet, starts[:, None], goals[None])
 
     def _flat(self, push: int, poses: Array) -> Array:
         x, y = self.fleet.flat_point[push]

@@ -161,15 +161,15 @@ def _settled(query: Query, best: Candidate, ranked: list[Candidate], settled: se
 
 
 def _answer(query: Query, found: Candidate, before: float, rounds: int) -> Refined:
-    arcs = query.arcs(found)
+    _, words = query.chain(found.pushes, found.poses)
     return Refined(
         found.cost,
         before,
         query.replanning(found),
         found.pushes,
         found.poses,
-        tuple("".join("LSR"[int(piece[0])] for piece in leg) for leg in arcs),
-        arcs[:, :, 1].copy(),
+        tuple("".join("LSR"[letter] for letter in word) for word in words["letter"].tolist()),
+        words["amount"].copy(),
         rounds,
     )
 
