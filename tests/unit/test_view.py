@@ -16,12 +16,14 @@ from PIL import Image
 from flatpush.control.loop.closed_loop import ClosedLoopRun
 from flatpush.errors import InputError
 from flatpush.geometry import Outline, compose, exp, inverse, transform
+from flatpush.planning.options import push_option
 from flatpush.problem import (
     Arc,
     CarCentres,
     Certificate,
     Object,
     Plan,
+    Planning,
     Push,
     Pusher,
     PushSegment,
@@ -35,8 +37,9 @@ from flatpush.view import PushSketch, check_figure, describe_figure, palette, sa
 from flatpush.view.drawing import Disc, Drawing, Line, Text
 from flatpush.view.panel import Panel, frame_for
 from flatpush.view.plan_figure import cone_length, draw_plan
+from flatpush.view.push_figure import draw_sketches, sense
 from flatpush.view.raster import PIXELS
-from flatpush.view.sketch import _sense
+from flatpush.view.sketches import _drive
 from flatpush.view.snapshots import moments, way_until
 from flatpush.view.timeline import Timeline, doing
 from flatpush.view.trace import fingertips, rollout_paths, trace_pushes
@@ -542,10 +545,35 @@ def test_far_and_single_contacts_are_drawn(tmp_path):
     ElementTree.fromstring(drawn([far, single], tmp_path))
 
 
-def test_centres_of_a_curve_are_told_apart_by_their_sense():
+def test_centres_of_a_curve_are_told_apart_by_theirsense():
     """A centre to the left of a push along +y is of a counter-clockwise turn."""
     centres = np.array([[-0.2, 0.03], [-9.0, 0.03], [np.nan, np.nan], [9.0, 0.03], [0.2, 0.03]])
-    assert _sense(sketch(centres=centres)).tolist() == [1.0, 1.0, 0.0, -1.0, -1.0]
+    assert sense(sketch(centres=centres)).tolist() == [1.0, 1.0, 0.0, -1.0, -1.0]
+
+
+def test_the_pushing_direction_stands_upright_on_the_arm_from_its_rotation_centre():
+    """Fig. 1: u lies in the motion cone; half as tight a turn of a Dubins car is about a centre twice as far away."""
+    thing = Object(Outline.polygon(TRIANGLE), "uniform", 0.3)
+    push = Push("long edge", thing.outline.nearest((0.0, -0.0095)))
+    scene = Scene(thing, (0, 0, 0), pushes=(push,), planning=Planning(model="ellipsoid"))
+    car = push_option(scene, push, margin=0.0).car
+    u, centre = _drive(car, push.at.point)
+    assert u @ (centre - push.at.point) == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(centre - car.flat_point) == pytest.approx(2 * car.radius, rel=1e-6)
+    assert (centre - car.flat_point) @ (car.left_centre - car.flat_point) > 0
+    left, right = car.contact.motion_cone(car.surface)
+    assert np.cross([*right, 0], [*u, 0])[2] > 0 > np.cross([*left, 0], [*u, 0])[2]
+
+
+def test_a_sketch_names_u_and_its_texts_do_not_overlap():
+    drive = sketch(drive=np.array([0.2, 1.0]), drive_centre=np.array([-0.06, 0.0]))
+    page = draw_sketches(make_plan().scene, [drive, sketch(refusal="off by 4.1 deg")])
+    texts = page.texts()
+    assert [t.text for t in texts].count("u") == 1
+    assert "u: a push to the left" in {t.text for t in texts}
+    assert "darker: whatever the pressure" not in {t.text for t in texts}  # nothing of that kind is drawn
+    for one, other in itertools.combinations(texts, 2):
+        assert not boxes_overlap(one.box, other.box), (one.text, other.text)
 
 
 def test_sketches_are_refused_in_other_formats_and_without_a_push(tmp_path):

@@ -1,7 +1,8 @@
-"""What a plan looks like: figures, animations and sketches of pushes. matplotlib is imported only to draw."""
+"""What a plan looks like: figures, animations and sketches of pushes."""
 
-from .describe import PushSketch, describe_figure
 from .figure import check_figure, save_figure
+from .push_figure import describe_figure
+from .push_sketch import PushSketch
 from .snapshots import check_snapshots, save_snapshots
 
 __all__ = [

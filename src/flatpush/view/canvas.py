@@ -28,7 +28,6 @@ STYLE = {
     "svg.fonttype": "path",
 }
 INK, SOFT = "#1a1a1a", "#555555"
-Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax [mm]
 DPI = 150  # of a PNG: 8 × 5.33 inches are 1200 × 800 pixels
 
 
@@ -65,38 +64,6 @@ def figure_bytes(figure: Any, extension: str, title: str) -> bytes:
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Title": title})
     text = buffer.getvalue().decode("utf-8")
     return re.sub(r'(<svg [^>]*?)height="[^"]*" ', r"\1", _full_width(text), count=1).encode("utf-8")
-
-
-def table_axes(axes: Any) -> Any:
-    """Dresses axes that show the table in mm; returns them."""
-    axes.set_xlabel("x [mm]")
-    axes.set_ylabel("y [mm]")
-    axes.grid(True, color="#ececec", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(length=2.5, width=0.6)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    return axes
-
-
-def settle(figure: Any, boxes: Sequence[tuple[Any, Box]]) -> None:
-    """Equal scales in axes that hold their box and fill their place; call it once titles and legend stand."""
-    for axes, box in boxes:
-        axes.set(xlim=box[::2], ylim=box[1::2], autoscale_on=False)
-    figure.draw_without_rendering()
-    for axes, box in boxes:
-        place = axes.get_window_extent()
-        middle, half = (
-            [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2],
-            [(box[2] - box[0]) / 2, (box[3] - box[1]) / 2],
-        )
-        scale = max(half[0] / place.width, half[1] / place.height)
-        reach = (scale * place.width, scale * place.height)
-        axes.set(
-            xlim=(middle[0] - reach[0], middle[0] + reach[0]),
-            ylim=(middle[1] - reach[1], middle[1] + reach[1]),
-        )
-        axes.set_aspect("equal", adjustable="box")
 
 
 def headline(figure: Any, title: str, subtitle: str) -> None:

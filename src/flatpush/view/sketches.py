@@ -12,7 +12,7 @@ from ..planning import PushDescription
 from ..problem import Scene
 from ..problem.mechanics import contacts_of, slider_of, surface_of, virtual_contact
 from ..steering.car import Car
-from .describe import PushSketch
+from .push_sketch import PushSketch
 
 CENTRES = 121
 
@@ -34,6 +34,7 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
     nothing = np.full(2, np.nan)
     car = option.car
     two = car is not None and car.cone is not None
+    drive, drive_centre = (nothing, nothing) if car is None else _drive(car, placement.points.mean(axis=0))
     return PushSketch(
         name=option.push.name,
         contact_points=placement.points,
@@ -54,7 +55,15 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
         centres=np.empty((0, 2)) if car is None or two or isinstance(surface, Ellipsoid) else _centres(car),
         region=StableCentres.of(car.cone, surface) if car is not None and car.cone is not None else None,
         any_pressure=_any_pressure(scene, placement) if two else None,
+        drive=drive,
+        drive_centre=drive_centre,
     )
+
+
+def _drive(car: Car, contact: Array) -> tuple[Array, Array]:
+    """Velocity of a contact point (in O) and rotation centre, of a left turn half as tight as the tightest."""
+    vx, vy, w = car.twist(0.5 / car.radius)
+    return np.array([vx - w * contact[1], vy + w * contact[0]]), np.array([-vy, vx]) / w
 
 
 def _any_pressure(scene: Scene, placement: Placement) -> StableRegion:

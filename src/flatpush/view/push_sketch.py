@@ -1,8 +1,6 @@
-"""Sketches of pushes after [Zhou2017] Figs. 1 and 2: cones, rotation centres, flat point."""
+"""What the sketch of one push shows, after [Zhou2017] Figs. 1 and 2: cones, rotation centres, flat point."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +9,6 @@ from ..geometry.pose import Array
 
 if TYPE_CHECKING:
     from ..contact import StableCentres, StableRegion
-    from ..problem import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +36,9 @@ class PushSketch:
             for the line under a general surface; empty for a line.
         region: two fingers with their composite cone: all rotation centres that keep both contacts, about the COF.
         any_pressure: the part of them that does so whatever the pressure on the table, after Lynch and Mason.
+        drive: the pushing direction u of Fig. 1, one that turns the object left half as tightly as it could; shape
+            (2,), nan if refused.
+        drive_centre: the rotation centre of the object's motion under it, shape (2,); nan if refused.
     """
 
     name: str
@@ -60,6 +60,8 @@ class PushSketch:
     centres: Array = field(default_factory=lambda: np.empty((0, 2)))
     region: "StableCentres | None" = None
     any_pressure: "StableRegion | None" = None
+    drive: Array = field(default_factory=lambda: np.full(2, np.nan))
+    drive_centre: Array = field(default_factory=lambda: np.full(2, np.nan))
 
     @property
     def steers(self) -> bool:
@@ -74,25 +76,3 @@ class PushSketch:
     def turning_radius(self) -> float:
         """Half the distance between the turning centres [m]."""
         return 0.5 * float(np.linalg.norm(self.left_centre - self.right_centre))
-
-
-def describe_figure(scene: "Scene", descriptions: Sequence[PushSketch], path: str | Path) -> None:
-    """Draws the pushes of a scene into a file, one panel each, whole or not at all.
-
-    Args:
-        scene: whose object is drawn.
-        descriptions: the pushes.
-        path: ends in .svg or .png.
-
-    Raises:
-        InputError: if the ending is another, the file cannot be written, or there is nothing to draw.
-    """
-    from ..documents.atomic import write_atomically
-    from ..errors import InputError
-    from .figure import check_ending
-    from .sketch import draw_sketches
-
-    ending = check_ending(path, (".svg", ".png"))
-    if not descriptions:
-        raise InputError("there is at least one push to describe", source=str(path))
-    write_atomically(path, draw_sketches(scene, tuple(descriptions), ending))
