@@ -1,17 +1,36 @@
-"""The robot-executed mazes of [Zhou2017] Figs. 10-11 with their stored pushes, and a check of ways by dense samples."""
+"""Mazes, one of our own and those of the recorded data, and a check of ways by dense samples."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import shapely
 
+import flatpush as fp
 from flatpush.geometry import Outline, compose, exp, transform
 from flatpush.geometry.collision import Body, World
-from flatpush.planning.obstacles import Task
+from flatpush.planning.obstacles import Task, task_of
 from flatpush.steering.fleet import Fleet
 
 MAZE_A = "maze2_verytight_mu05steerdist05k100_robotexecute"
 MAZE_B = "maze2_verytight_mu045steerdist055k100_robotexecute"
+
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "maze.yaml"
+
+
+def maze_scene(**planning) -> fp.Scene:
+    """The maze of the examples without a clearance; pushes are chosen automatically, and iterations end the search."""
+    scene = fp.load_scene(EXAMPLE)
+    asked = replace(scene.planning, clearance=0.0, time_limit=1e6, iterations=400, **planning)
+    return replace(scene, pushes="auto", planning=asked)
+
+
+def maze_task(need=0.0) -> Task:
+    """The search of that maze."""
+    planner = fp.Planner(maze_scene(), tree=False)
+    return replace(task_of(planner.scene, planner.usable, planner.fleet), clearance=need)
 
 
 def stored_task(folder, name=MAZE_B, need=0.0, approach=0.002) -> Task:

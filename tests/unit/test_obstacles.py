@@ -17,14 +17,14 @@ from flatpush.planning.obstacles.trees import Trees
 from flatpush.planning.path import Path
 from flatpush.steering.three_twist import words
 
-from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, stored_task
+from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, maze_scene, maze_task, stored_task
 
 NEED = 1.5e-5
 
 
 @pytest.fixture(scope="module")
-def task(data_folder):
-    return stored_task(data_folder, need=NEED)
+def task():
+    return maze_task(NEED)
 
 
 def searched(task, seed, work):
@@ -165,26 +165,13 @@ def test_narrow_passages_of_the_robot_mazes_are_found(data_folder, name):
     assert search.cost <= {MAZE_A: 0.55, MAZE_B: 0.62}[name]
 
 
-def maze_scene(data_folder, **planning):
-    task = stored_task(data_folder)
-    thing = fp.Object(task.bodies[0].outline.vertices, "uniform", friction=0.45)
-    return fp.Scene(
-        thing,
-        task.start,
-        task.goal,
-        pusher=fp.Pusher(fingers=2, spacing=0.018),
-        workspace=fp.Workspace(tuple(task.world.bounds), tuple(o.vertices for o in task.world.obstacles)),
-        planning=fp.Planning(switch_cost=0.2, time_limit=60, iterations=400, **planning),
-    )
-
-
 def body_steps(segment):
     return [arc.duration * np.asarray(arc.twist) for arc in segment.arcs]
 
 
-def test_the_planner_plans_the_maze_with_a_certificate(data_folder):
+def test_the_planner_plans_the_maze_with_a_certificate():
     seen = []
-    planner = fp.Planner(maze_scene(data_folder), tree=False, progress=lambda *told: seen.append(told))
+    planner = fp.Planner(maze_scene(), tree=False, progress=lambda *told: seen.append(told))
     answers = list(planner.answers())
     costs = [answer.cost for answer in answers]
     assert costs == sorted(costs, reverse=True)
@@ -206,18 +193,18 @@ def test_the_planner_plans_the_maze_with_a_certificate(data_folder):
     assert 100 < len(explored) <= 2000
 
 
-def test_plans_among_obstacles_repeat(data_folder):
-    one, two = (fp.Planner(maze_scene(data_folder, seed=2), tree=False).plan() for _ in range(2))
+def test_plans_among_obstacles_repeat():
+    one, two = (fp.Planner(maze_scene(seed=2), tree=False).plan() for _ in range(2))
     assert one.cost == two.cost
     assert [s.word for s in one.pushes] == [s.word for s in two.pushes]
 
 
-def test_an_interrupt_passes_through(data_folder):
+def test_an_interrupt_passes_through():
     def interrupt(cost, clock, poses):
         if np.isfinite(cost):
             raise KeyboardInterrupt
 
-    planner = fp.Planner(maze_scene(data_folder), tree=False, progress=interrupt)
+    planner = fp.Planner(maze_scene(), tree=False, progress=interrupt)
     answers = planner.answers()
     kept = next(answers)
     with pytest.raises(KeyboardInterrupt):
@@ -225,8 +212,8 @@ def test_an_interrupt_passes_through(data_folder):
     assert kept.plan().status == "solved"
 
 
-def test_walled_in_goals_end_with_words(data_folder):
-    scene = maze_scene(data_folder)
+def test_walled_in_goals_end_with_words():
+    scene = maze_scene()
     wall = np.array([(0.0, 0.06), (0.23, 0.06), (0.23, 0.0884), (0.0, 0.0884)])
     closed = replace(scene, workspace=replace(scene.workspace, obstacles=(*scene.workspace.obstacles, wall)))
     plan = fp.Planner(closed, tree=False).plan()
@@ -243,14 +230,14 @@ def test_walled_in_goals_end_with_words(data_folder):
     assert "poses were searched from the start and from the goal" in plan.reason
 
 
-def test_a_start_in_collision_is_named(data_folder):
-    scene = replace(maze_scene(data_folder), start=(0.2, 0.15, 0.0))
+def test_a_start_in_collision_is_named():
+    scene = replace(maze_scene(), start=(0.2, 0.15, 0.0))
     with pytest.raises(fp.InputError, match="at the start the object crosses obstacle 0"):
         fp.Planner(scene, tree=False).plan()
 
 
-def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles(data_folder):
-    scene = replace(maze_scene(data_folder), start=(0.08, -0.05, 2.0), goal=(0.0, 0.0, 0.0))
+def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles():
+    scene = replace(maze_scene(), start=(0.08, -0.05, 2.0), goal=(0.0, 0.0, 0.0))
     free = replace(scene, workspace=fp.Workspace())
     far = np.array([(0.5, 0.5), (0.6, 0.5), (0.6, 0.6)])
     kept = fp.Planner(replace(scene, workspace=fp.Workspace(None, (far,))), tree=False).plan()
@@ -266,7 +253,7 @@ def test_offered_ways_must_be_free(task):
     assert not other.offer(through)
 
 
-def test_round_objects_and_obstacles(data_folder):
+def test_round_objects_and_obstacles():
     thing = fp.Object(Outline.circle(0.02), "uniform", friction=0.4)
     scene = fp.Scene(
         thing,
