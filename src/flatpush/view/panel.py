@@ -119,7 +119,7 @@ class Panel:
         """The grid, its numbers, and what they are; an empty name leaves it out."""
         left, top, right, bottom = self.frame
         line = Look(GRID, 0.6)
-        for value in ticks(self.box[0], self.box[2], (right - left) / 48):
+        for value in ticks(self.box[0], self.box[2], max((right - left) / 48, 4.5)):
             place = float(self.at(np.array([value, 0.0]))[0])
             self.page.add(d.Line(np.array([[place, top], [place, bottom]]), line), -2)
             if numbers[0]:

@@ -141,11 +141,13 @@ def _draw_centres(panel: Panel, scene: Scene, sketch: PushSketch) -> None:
     _object(panel, scene, sketch)
     _rotation_centres(panel, sketch, pointers=True)
     _drive_centre(panel, sketch)
-    start = MM * sketch.flat_point
-    length = 0.22 * (panel.box[3] - panel.box[1])
-    panel.arrow(
-        start, start + length * sketch.straight / np.linalg.norm(sketch.straight), palette.STRAIGHT, 1.8, 8
-    )
+    panel.arrow(MM * sketch.flat_point, MM * _ahead(scene, sketch), palette.STRAIGHT, 1.8, 8)
+
+
+def _ahead(scene: Scene, sketch: PushSketch) -> Array:
+    """The head of the arrow of the straight motion, in O."""
+    unit = sketch.straight / np.linalg.norm(sketch.straight)
+    return np.asarray(sketch.flat_point + 0.4 * scene.object.outline.size * unit)
 
 
 def _drive_centre(panel: Panel, sketch: PushSketch) -> None:
@@ -267,6 +269,7 @@ def _contact_box(scene: Scene, sketch: PushSketch) -> Box:
 def _centres_box(scene: Scene, sketch: PushSketch) -> Box:
     outline, cof, size = scene.object.outline.polyline(), sketch.cof, scene.object.outline.size
     shown = [outline, sketch.fingertips - sketch.tip_radius, sketch.fingertips + sketch.tip_radius]
+    shown.append(_ahead(scene, sketch)[None])
     for place in (sketch.left_centre, sketch.right_centre, sketch.flat_point, sketch.drive_centre):
         if np.all(np.isfinite(place)) and np.linalg.norm(place - cof) <= FAR * size:
             # Beyond a centre there must be room to see where its ray goes.
