@@ -13,7 +13,7 @@ import enum
 import hashlib
 import pickle
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
@@ -24,25 +24,28 @@ from llvmlite import binding, ir
 from numba.core import caching, compiler, event, serialize, sigutils, types
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
-from . import compiling, kernel_store
+from . import compiling, formulas, kernel_store
 
 F = TypeVar("F", bound=Callable[..., object])
 
 _PLAIN = {"error_model": "numpy"}
+_LENT = {"_nrt": False}  # no counting of references: arrays are the caller's, and nothing is allocated
 _WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _FUSED = {
     "fastmath": {"contract"}
 }  # contraction to multiply-and-add is the only liberty with floats that is taken
 
 
-def kernel(signature: object = None, *, fused: bool = False) -> Callable[[F], F]:
+def kernel(signature: object = None, *, fused: bool = False, lent: bool = False) -> Callable[[F], F]:
     """Decorates a function that Python calls: kept on disk, without the interpreter's lock.
 
     With a signature it is compiled (or read from disk) when its module is imported, without one when it is called.
+    It may be `fused` (multiply and add at once), and counts no references to arrays, which all are `lent` to it.
     """
-    options = _PLAIN | (_FUSED if fused else {})
+    _learn_formulas()
+    options = _PLAIN | (_FUSED if fused else {}) | (_LENT if lent else {})
 
     def decorate(function: F) -> F:
         made = nb.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
@@ -230,6 +233,8 @@ def _value(value: Any) -> bytes:
         return value.__name__.encode()
     if isinstance(value, tuple | list):
         return repr(type(value)).encode() + b"".join(map(_value, value))
+    if isinstance(value, dict):  # the ways of a choice by type
+        return b"".join(_value(part) for item in value.items() for part in item)
     known = isinstance(value, int | float | complex | str | bytes | np.generic | np.dtype | None)
     return repr(value).encode() if known or isinstance(value, nb.types.Type) else repr(type(value)).encode()
 
@@ -263,3 +268,27 @@ class _Watch(event.Listener):
 
 
 event.register("numba:compile", _Watch())
+
+
+def _learn_formulas() -> None:
+    """Tells the compiler of the formulas and choices collected since it was last told."""
+    for function in formulas.FORMULAS:
+        overload(function, jit_options=_PLAIN | _WITHIN | _LENT, strict=False)(_itself(function))
+    for chosen, ways in formulas.CHOICES:
+        overload(chosen, jit_options=_PLAIN | _WITHIN | _LENT, strict=False)(_way_of(ways))
+    formulas.FORMULAS.clear()
+    formulas.CHOICES.clear()
+
+
+def _itself(function: Callable[..., object]) -> Callable[..., object]:
+    def source(*_: object) -> Callable[..., object]:
+        return function
+
+    return source
+
+
+def _way_of(ways: Mapping[type, Callable[..., object]]) -> Callable[..., object]:
+    def source(first: nb.types.BaseNamedTuple, *_: object) -> Callable[..., object]:
+        return ways[first.instance_class]
+
+    return source

@@ -8,9 +8,11 @@ from flatpush.contact import PointContact
 from flatpush.errors import InputError
 from flatpush.friction import Exact, LimitSurface
 from flatpush.simulation.plant import MODES, Plant
-from flatpush.simulation.plant.table import kernels as table_kernels
-from flatpush.simulation.plant.table import outline_table, surface_table
-from flatpush.simulation.plant.touch import kernels as touch_kernels
+from flatpush.simulation.plant import plant as module
+from flatpush.simulation.plant.arrays import interpreted, outline_arrays, surface_arrays
+from flatpush.simulation.plant.contact_modes import one
+from flatpush.simulation.plant.resistance import stick_of, twist_of, wrench_of
+from flatpush.simulation.plant.steps import nearest
 
 TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
 HOOK = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.04), (0.04, 0.04), (0.04, 0.02), (0.0, 0.02)]
@@ -35,10 +37,10 @@ def surfaces() -> dict[str, LimitSurface]:
 
 
 @pytest.mark.parametrize("name", list(surfaces()))
-def test_tables_resist_as_the_surfaces_they_were_made_of(name):
+def test_arrays_resist_as_the_surfaces_they_were_made_of(name):
     surface = surfaces()[name]
-    kind, table = surface_table(surface)
-    ell = table[0, 0]
+    arrays = interpreted(surface_arrays(surface))
+    ell = arrays.unit
     units = np.array([1.0, 1.0, ell])
     rng = np.random.default_rng(1)
 
@@ -47,27 +49,27 @@ def test_tables_resist_as_the_surfaces_they_were_made_of(name):
 
     for _ in range(100):
         x = rng.normal(size=3) * 10 ** rng.uniform(-2, 2, 3)
-        F = np.array(table_kernels.wrench_of(kind, table, *x)[:3])
+        F = np.array(wrench_of(arrays, *map(float, x))[:3])
         assert unit(F) == pytest.approx(unit(surface.wrench(x / units) / units), abs=1e-10)
-        V = np.array(table_kernels.twist_of(kind, table, *x))
+        V = np.array(twist_of(arrays, *map(float, x)))
         assert unit(V) == pytest.approx(unit(surface.twist(x * units) * units), abs=1e-9)
         p, u = rng.normal(size=2) * 1.5, rng.normal(size=2)
-        V = np.array(table_kernels.stick_of(kind, table, *p, *u))
+        V = np.array(stick_of(arrays, *map(float, [*p, *u])))
         assert pytest.approx(surface.stick(p * ell, u) * units, abs=1e-10) == V
 
 
 @pytest.mark.parametrize("name", list(surfaces()))
 def test_one_contact_moves_as_point_contact_says(name):
     surface = surfaces()[name]
-    kind, table = surface_table(surface)
-    ell = table[0, 0]
+    arrays = interpreted(surface_arrays(surface))
+    ell = arrays.unit
     rng = np.random.default_rng(2)
     for i in range(100):
         p, u, n = rng.normal(size=2) * ell * 1.5, rng.normal(size=2), rng.normal(size=2)
         n = n / np.hypot(*n)
         mu = 0.0 if i % 9 == 0 else rng.uniform(0, 1.5)
         want = PointContact(p, n, mu, hook=True).motion(surface, u)
-        mode, *V, slip = touch_kernels.one(kind, table, *(p / ell), *n, *u, mu)
+        mode, *V, slip = one(arrays, *map(float, [*(p / ell), *n, *u]), mu)
         assert MODES[mode] == want.mode.value
         assert np.array(V) == pytest.approx(
             want.twist * [1, 1, ell], abs=1e-8 * (1 + np.abs(want.twist[:2]).max())
@@ -76,18 +78,16 @@ def test_one_contact_moves_as_point_contact_says(name):
 
 
 def test_outlines_are_seen_as_outline_nearest_sees_them():
-    from flatpush.simulation.plant.kernels import nearest
-
     rng = np.random.default_rng(3)
     for outline in (
         fp.Outline.polygon(HOOK),
         fp.Outline.polygon(TRIANGLE[::-1]),
         fp.Outline.circle(0.02, (0.01, 0)),
     ):
-        table = outline_table(outline)
+        arrays = interpreted(outline_arrays(outline))
         for point in rng.uniform(-0.03, 0.08, (300, 2)):
             want = outline.nearest(point)
-            d, px, py, nx, ny, feature = nearest(table, *point)
+            d, px, py, nx, ny, feature = nearest(arrays, *map(float, point))
             assert d == pytest.approx(want.distance, abs=1e-15)
             assert [px, py] == pytest.approx(want.point, abs=1e-15)
             if feature % 2 == 0:
@@ -159,6 +159,23 @@ def test_many_runs_are_the_single_runs(square):
             assert np.array_equal(run.object, runs.object[i])
             assert np.array_equal(run.modes, runs.modes[i])
             assert np.array_equal(runs.final[i], run.object[-1])
+
+
+@pytest.mark.parametrize("name", ["three feet", "ellipsoid"])
+def test_a_first_run_is_every_later_run_to_the_last_bit(monkeypatch, name):
+    """What is interpreted before the kernels are there and what they compute then are the same numbers."""
+    thing = fp.Object(HOOK, friction=0.35)
+    hand = [[0.05, -0.01, 1.5], [0.05, 0.02, 1.6], [0.045, 0.04, 1.9], [0.0, 0.06, 2.4]]
+    plant = Plant(thing, [[0.0, 0.009], [0.0, -0.009]], 0.0025, surface=surfaces()[name])
+    runs = []
+    for patience in (1e9, 0.0):
+        monkeypatch.setattr(module, "_patience", [patience])
+        monkeypatch.setattr(module, "_ready", set())
+        runs.append(plant.follow([0, 0, 0], hand, body=True))
+        assert bool(module._ready) == (patience == 0.0)
+    assert np.array_equal(runs[0].object, runs[1].object)
+    assert np.array_equal(runs[0].modes, runs[1].modes)
+    assert np.any(runs[0].object[-1] != 0)
 
 
 def test_what_makes_no_sense_is_refused(square):

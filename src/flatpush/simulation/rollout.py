@@ -14,11 +14,9 @@ from ..problem.mechanics import named, placement_of, surface_of
 from ..problem.scene import Model
 from .corners import passed_a_corner
 from .pieces import Source
-from .plant import MODES, Plant
-from .plant.plant import OUTCOMES
+from .plant import MODES, OUTCOMES, Plant
+from .plant.codes import REST, SEPARATION, STICKING
 from .stretches import Stretch, stretches
-
-REST, STICKING, _, _, SEPARATION = range(5)  # codes of MODES
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
-"""Any fingers against an object, quasi-statically, step by step: compiled, with a plain twin."""
+"""Any fingers against an object, quasi-statically, step by step, interpreted or compiled."""
 
-from .plant import MODES, OUTCOMES, Plant, PlantRun, PlantRuns, PlantState
+from .codes import MODES, OUTCOMES
+from .plant import Plant, PlantRun, PlantRuns, PlantState
 
 __all__ = ["MODES", "OUTCOMES", "Plant", "PlantRun", "PlantRuns", "PlantState"]

@@ -1,6 +1,6 @@
-"""The plant's steps written plainly, for any number of contacts and any limit surface: what the kernels are held to.
+"""The plant's steps written plainly, for any number of contacts and any limit surface: what the steps are held to.
 
-As simulation.plant.kernels, but for the speed: contacts move the object as contact.several says.
+As simulation.plant.steps, but for the speed: contacts move the object as contact.several says.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,7 @@ from ...contact.several import several_motion
 from ...friction.surface import LimitSurface
 from ...geometry import Outline, compose, exp, inverse, perpendicular, rotate, shift_twist, transform
 from ...geometry.pose import Array
-
-STEP, TOUCH, OVERLAP = 1 / 60, 2e-8, 1e-5  # as in the kernels, by the outline's size
-_LOOKS, _HALVINGS, _SETTLES = 8, 5, 4
+from .steps import CORNER_STEP, HALVINGS, LEVER, LOOKS, OVERLAP, SETTLES, SHARP_STEP, STEP, TOUCH
 
 Held = set[tuple[int, int]]  # fingers that touch, with the number of the place
 
@@ -79,15 +77,15 @@ class Fingers:
                 return "jammed" if np.any(still) else "grasped", q, _moved(hands, step, body, s), modes, seen
             stretch = STEP * size
             if any(t.feature[1] for t in touching):
-                stretch = min(stretch, max(0.25 * self.radius, 2e-4 * size))
+                stretch = min(stretch, max(CORNER_STEP * self.radius, SHARP_STEP * size))
             h = (1 - s) / max(1.0, np.ceil((1 - s) * travel / stretch - 1e-9))
-            shortest, settled = h / 2**_HALVINGS, 0
+            shortest, settled = h / 2**HALVINGS, 0
             while True:
                 mean, changed, last = self._slope(q, hands, step, body, s, h, held, touching, twist, now)
                 if changed and h > 1.5 * shortest:
                     h *= 0.5
                     continue
-                if settled == _SETTLES:
+                if settled == SETTLES:
                     break
 
                 def gap(
@@ -97,7 +95,7 @@ class Fingers:
                     return min((t.gap for t in places if (t.finger, t.slot) not in held), default=np.inf)
 
                 before, hit = 0.0, None
-                for look in np.arange(1, _LOOKS + 1) / _LOOKS:
+                for look in np.arange(1, LOOKS + 1) / LOOKS:
                     if gap(look) < 0:
                         hit = look
                         break
@@ -174,7 +172,7 @@ class Fingers:
 
     def settle(self, q: Array, hands: Array, held: Held, last: list[str]) -> Array:
         """Moves the object the least so that what touches does so exactly, and what has parted does not overlap."""
-        ell = 0.3 * self.outline.size
+        ell = LEVER * self.outline.size
         for _ in range(3):
             places = [t for t in self.near(q, hands) if (t.finger, t.slot) in held]
             parted = (ContactMode.SEPARATION.value, ContactMode.REST.value)

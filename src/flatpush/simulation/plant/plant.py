@@ -4,10 +4,10 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
 from ...friction.surface import LimitSurface
@@ -15,13 +15,30 @@ from ...geometry.pose import Array
 from ...problem import Object
 from ...problem.mechanics import surface_of
 from ...problem.scene import Model
-from . import runs
+from . import runs, steps
+from .arrays import (
+    POINT,
+    POSE,
+    SEEN,
+    Course,
+    ManySettings,
+    SeenRows,
+    Setting,
+    SurfaceArrays,
+    blank,
+    compilable,
+    interpreted,
+    of_many,
+    outline_arrays,
+    plain_rows,
+    records,
+    scratch,
+    surface_arrays,
+)
+from .codes import AS_IT_IS, BODY, LEFT, MANY, MODES, OUTCOMES, RIGHT, STRAIGHT, UNDECIDED
 from .plain import Fingers
-from .runs import MODES, OUTCOMES
-from .table import compilable, outline_table, surface_table
 
-UNKNOWN = -1  # kind of a surface that only the plain way knows
-_MANY, _UNDECIDED = OUTCOMES.index("too many contacts"), OUTCOMES.index("undecided")
+Codes = NDArray[np.integer]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +76,7 @@ class PlantRun:
     """
 
     object: Array
-    modes: Array
+    modes: Codes
     points: Array
     gaps: Array
     outcome: str
@@ -78,10 +95,10 @@ class PlantRuns:
     """
 
     final: Array
-    outcome: Any
-    stuck: Any
+    outcome: Codes
+    stuck: NDArray[np.bool_]
     object: Array | None = None
-    modes: Any = None
+    modes: Codes | None = None
     points: Array | None = None
 
 
@@ -137,11 +154,10 @@ class Plant:
         self.surface = surface if surface is not None else surface_of(thing, model, np.array([1.0, 0.0]))
         self.fingers, self.tip_radius = tips, float(tip_radius)
         self.cof = _vector(thing.cof if cof is None else cof, 2, "a centre of friction")
-        known = compilable(self.surface)
-        self._plain = plain or len(tips) > 2 or not known
-        kind, table = surface_table(self.surface) if known else (UNKNOWN, np.zeros((1, 1)))
-        # (kind, table, cof, shape, mu, radius, fingers): the first arguments of the kernels, if they know the kind.
-        self._pack = (kind, table, self.cof, outline_table(thing.outline), mu, self.tip_radius, tips)
+        self._plain = plain or len(tips) > 2 or not compilable(self.surface)
+        self._arrays = None if self._plain else surface_arrays(self.surface)
+        self._shared = None if self._arrays is None else of_many([self._arrays])
+        self._outline, self._points = outline_arrays(thing.outline), records(POINT, tips)
 
     def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
         """The state with the object at X_WO and the hand at X_WE, (3,) or one for each finger (k, 3).
@@ -149,10 +165,9 @@ class Plant:
         Where fingers overlap the object it is moved out the shortest way, or, without push_out, the state's outcome is
         "starts inside".
         """
-        q, hands = _vector(object_, 3, "a pose").copy(), self._hands(hand)
-        if push_out:
-            self._push_out(q, hands)
-        return self._moved(q, hands, np.zeros_like(hands), np.ndim(hand) == 2)
+        hands = self._hands(hand)
+        done = self._run(_vector(object_, 3, "a pose")[None], hands[None, None], AS_IT_IS, push_out)
+        return self._state(done, np.ndim(hand) == 2)
 
     def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
         """The state after a time dt in which the hand moves with a velocity in W (vx, vy, yaw rate), (3,) or (k, 3).
@@ -167,7 +182,8 @@ class Plant:
             raise InputError("a velocity is three finite numbers for each hand", value=velocity)
         if state.outcome:
             return state
-        return self._moved(state.object.copy(), hands, step, state.hand.ndim == 2)
+        done = self._run(state.object[None], np.stack([hands, hands + step])[None], AS_IT_IS)
+        return self._state(done, state.hand.ndim == 2)
 
     def follow(
         self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True, body: bool = False
@@ -178,20 +194,17 @@ class Plant:
             push_out: as in start.
             body: whether the hand goes from pose to pose with a constant body twist instead.
         """
-        q, hands = _vector(object_, 3, "a pose").copy(), self._way(hand)
-        if push_out:
-            self._push_out(q, hands[0])
-        n, k = len(hands), len(self.fingers)
-        poses, seen = np.empty((n, 3)), np.zeros((n, k, 5))
-        status, reached = _MANY, 0
-        if not self._plain:
-            from .kernels import follow as kernel
-
-            status, reached = kernel(*self._pack, q.copy(), hands, int(body), poses, seen)
-        if status in (_MANY, _UNDECIDED):
-            status, reached = runs.follow(self._written(self._pack), q, hands, int(body), poses, seen)
+        hands = self._way(hand)
+        q = _vector(object_, 3, "a pose")
+        done = self._run(q[None], hands[None], BODY if body else STRAIGHT, push_out, len(hands))
+        seen = done.seen[0]
         return PlantRun(
-            poses, seen[:, :, 0].astype(np.int8), seen[:, :, 1:3], seen[:, :, 3], OUTCOMES[status], reached
+            done.poses[0],
+            seen["mode"].astype(np.int8),
+            _points(seen),
+            seen["gap"],
+            OUTCOMES[done.outcome[0]],
+            int(done.reached[0]),
         )
 
     def many(
@@ -217,58 +230,31 @@ class Plant:
         objects = np.array(starts, dtype=float)
         if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
             raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
-        n, k = len(objects), len(self.fingers)
-        kind, table, cof, shape, mu, radius, fingers = self._pack
+        n = len(objects)
         hands = np.array(hand, dtype=float)
         hands = self._way(hands)[None] if hands.ndim == 2 else np.stack([self._way(h) for h in hands])
-        tables, plain = table[None], self._plain
-        if surfaces is not None and (self._plain or not all(map(compilable, surfaces))):
-            plain = True
-            if len(surfaces) not in (1, n):
-                raise InputError(f"surfaces: one for all or one for each of {n} runs", value=len(surfaces))
-        elif surfaces is not None:
-            packed = [surface_table(s) for s in surfaces]
-            if len({(p[0], p[1].shape) for p in packed}) != 1:
-                raise InputError("the surfaces of many runs are of one kind and size")
-            kind, tables = packed[0][0], np.stack([p[1] for p in packed])
-        mus = np.array([mu]) if friction is None else np.array(friction, dtype=float)
-        centres = cof[None] if cofs is None else np.ascontiguousarray(np.array(cofs, dtype=float))
-        for what, values, width in (
-            ("friction", mus[:, None], 1),
-            ("cofs", centres, 2),
-            ("surfaces", tables[:, 0], None),
-            ("hand", hands[:, 0, 0], 3),
+        mus = None if friction is None else np.array(friction, dtype=float)
+        centres = None if cofs is None else np.ascontiguousarray(np.array(cofs, dtype=float))
+        for what, values, shape in (
+            ("friction", mus, ()),
+            ("cofs", centres, (2,)),
+            ("surfaces", None if surfaces is None else np.zeros(len(surfaces)), ()),
+            ("hand", hands[:, 0, 0], (3,)),
         ):
-            if (
-                len(values) not in (1, n)
-                or (width and values.shape[1] != width)
-                or not np.isfinite(values).all()
-            ):
+            if values is None:
+                continue
+            if values.shape not in ((1, *shape), (n, *shape)) or not np.isfinite(values).all():
                 raise InputError(f"{what}: one for all or one for each of {n} runs", value=values.shape)
-        if np.any(mus < 0):
+        if mus is not None and np.any(mus < 0):
             raise InputError("friction is 0 or more", value=float(mus.min()))
         rows = hands.shape[1] if record else 1
-        poses, seen, outcome = np.empty((n, rows, 3)), np.zeros((n, rows, k, 5)), np.zeros(n, np.int64)
-        workers = threads or os.cpu_count() or 1
-        size = max(1, -(-n // (4 * workers)))
-        args = (kind, tables, centres, shape, mus, radius, fingers, objects, hands, int(body), int(push_out))
-
-        begun = objects.copy()
-        if n and not plain:
-            from .kernels import many as kernel
-
-            def chunk(first: int) -> None:
-                kernel(first, min(first + size, n), *args, poses, seen, outcome)
-
-            chunk(0)  # compiles, if need be, in one thread
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(chunk, range(size, n, size)))
-        for r in range(n) if plain else np.flatnonzero(np.isin(outcome, (_MANY, _UNDECIDED))):
-            self._again(int(r), begun[r], args, surfaces, push_out, poses, seen, outcome)
-        bits = seen[..., 4].astype(int)
-        stuck = ~np.any(bits & 0b1100, axis=(1, 2))
-        way = (poses, seen[..., 0].astype(np.int8), seen[..., 1:3]) if record else (None, None, None)
-        return PlantRuns(poses[:, -1], outcome, stuck, *way)
+        kind = BODY if body else STRAIGHT
+        done = self._run(objects, hands, kind, push_out, rows, mus, centres, surfaces, threads)
+        stuck = ~np.any(done.seen["modes"] & (1 << LEFT | 1 << RIGHT), axis=(1, 2))
+        if not record:
+            return PlantRuns(done.poses[:, -1], done.outcome, stuck)
+        modes = done.seen["mode"].astype(np.int8)
+        return PlantRuns(done.poses[:, -1], done.outcome, stuck, done.poses, modes, _points(done.seen))
 
     def _hands(self, hand: ArrayLike) -> Array:
         hands = np.atleast_2d(np.array(hand, dtype=float))
@@ -285,55 +271,160 @@ class Plant:
             raise InputError("the poses of the hand are finite numbers")
         return np.ascontiguousarray(way)
 
-    def _push_out(self, q: Array, hands: Array) -> None:
-        if self._plain:
-            runs.push_out(self._written(self._pack), q, hands)
-        else:
-            from .kernels import push_out
-
-            _, _, cof, shape, _, radius, fingers = self._pack
-            push_out(shape, cof, radius, fingers, q, hands)
-
-    def _written(self, pack: tuple[Any, ...], surface: LimitSurface | None = None) -> Fingers:
-        """The plain version of what is packed."""
-        _, _, cof, _, mu, radius, fingers = pack
-        return Fingers(self.thing.outline, surface or self.surface, cof, mu, radius, fingers)
-
-    def _again(
+    def _run(
         self,
-        r: int,
-        q: Array,
-        args: tuple[Any, ...],
-        surfaces: Sequence[LimitSurface] | None,
+        starts: Array,
+        hands: Array,
+        kind: int,
+        push_out: bool = False,
+        rows: int = 1,
+        mus: Array | None = None,
+        cofs: Array | None = None,
+        surfaces: Sequence[LimitSurface] | None = None,
+        threads: int | None = None,
+    ) -> "_Done":
+        """Runs from starts (n, 3) under hands (n or 1, m, h, 3); what is None is the plant's own."""
+        n, k = len(starts), len(self.fingers)
+        mus = np.array([self.friction]) if mus is None else mus
+        cofs = self.cof[None] if cofs is None else cofs
+        poses, seen = np.empty((n, rows, 3)), np.zeros((n, rows, k), SEEN)
+        done = _Done(poses, seen, np.full(n, MANY), np.zeros(n, np.int64), hands[-1, 0].copy())
+        packed = None if self._arrays is None else [self._arrays]
+        if packed and surfaces is not None:
+            packed = [surface_arrays(s) for s in surfaces] if all(map(compilable, surfaces)) else None
+        if packed and n:
+            work = 0.0 if type(packed[0]) in _ready else n * self._work(hands)
+            _patience[0] -= work
+            if type(packed[0]) in _ready or _patience[0] < 0:
+                self._compiled(starts, hands, kind, push_out, mus, cofs, packed, threads, done)
+            else:
+                self._interpreted(starts, hands, kind, push_out, mus, cofs, packed, done)
+        for r in np.flatnonzero(done.outcome >= MANY).tolist():
+            surface = self.surface if surfaces is None else surfaces[r % len(surfaces)]
+            mu, cof = float(mus[r % len(mus)]), cofs[r % len(cofs)]
+            written = Fingers(self.thing.outline, surface, cof, mu, self.tip_radius, self.fingers)
+            q, way = starts[r].copy(), hands[r % len(hands)]
+            if push_out:
+                runs.push_out(written, q, way[0])
+            done.outcome[r], done.reached[r], done.hands[:] = runs.follow(
+                written, q, way, kind, poses[r], seen[r]
+            )
+        return done
+
+    def _work(self, hands: Array) -> float:
+        """Steps that a run takes at least."""
+        turn = np.max(np.hypot(*self.fingers.T)) + self._outline.size
+        ways = np.abs(np.diff(hands, axis=1)) @ [1.0, 1.0, turn] / (steps.STEP * self._outline.size)
+        return float(np.max(np.sum(np.maximum(1.0, ways), axis=(1, 2)), initial=1.0))
+
+    def _interpreted(
+        self,
+        starts: Array,
+        hands: Array,
+        kind: int,
         push_out: bool,
-        poses: Array,
-        seen: Array,
-        outcome: Any,
+        mus: Array,
+        cofs: Array,
+        packed: Sequence[SurfaceArrays],
+        done: "_Done",
     ) -> None:
-        """Run r of many, plainly."""
-        kind, tables, cofs, shape, mus, radius, fingers, _, hands, body, _ = args
-        mine = (kind, tables, cofs[r % len(cofs)], shape, float(mus[r % len(mus)]), radius, fingers)
-        written = self._written(mine, None if surfaces is None else surfaces[r % len(surfaces)])
-        way = hands[r % len(hands)]
-        if push_out:
-            runs.push_out(written, q, way[0])
-        outcome[r], _ = runs.follow(written, q, way, body, poses[r], seen[r])
+        room = scratch(len(self.fingers), True)
+        count, rows = hands.shape[2], done.poses.shape[1]
+        ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in hands]
+        surfaces = [interpreted(arrays) for arrays in packed]
+        outline, fingers = interpreted(self._outline), plain_rows(self._points)
+        out, seen = blank(POSE, rows), blank(SEEN, rows * len(fingers))
+        start = blank(POSE, 1)[0]
+        for r, pose in enumerate(starts.tolist()):
+            mu, (x, y) = float(mus[r % len(mus)]), cofs[r % len(cofs)].tolist()
+            surface, way = surfaces[r % len(surfaces)], ways[r % len(ways)]
+            setting = Setting(surface, x, y, outline, mu, self.tip_radius, fingers)
+            start.x, start.y, start.angle = pose
+            try:
+                if push_out:
+                    steps.push_out(setting, start, way[:count], room)
+                done.outcome[r], done.reached[r] = steps.follow(
+                    setting, start, way, count, kind, out, seen, room
+                )
+            except (ArithmeticError, ValueError):  # where the compiled formulas go on with inf or nan
+                done.outcome[r] = UNDECIDED
+                continue
+            done.poses[r] = [(q.x, q.y, q.angle) for q in out]
+            done.seen[r].flat = [(s.x, s.y, s.gap, s.mode, s.modes) for s in seen]
+            done.hands[:] = [(h.x, h.y, h.angle) for h in room.hands[:count]]
 
-    def _moved(self, q: Array, hands: Array, step: Array, separate: bool) -> PlantState:
-        seen, status = np.zeros((len(self.fingers), 5)), _MANY
-        if not self._plain:
-            from .kernels import advance
+    def _compiled(
+        self,
+        starts: Array,
+        hands: Array,
+        kind: int,
+        push_out: bool,
+        mus: Array,
+        cofs: Array,
+        packed: Sequence[SurfaceArrays],
+        threads: int | None,
+        done: "_Done",
+    ) -> None:
+        from .kernels import many
 
-            begun, held = q.copy(), hands.copy()
-            status = advance(*self._pack, q, hands, step, 0, seen)
-            if status in (_MANY, _UNDECIDED):
-                q, hands = begun, held
-        if status in (_MANY, _UNDECIDED):
-            status = runs.advance(self._written(self._pack), q, hands, step, 0, seen)
-        modes = tuple(MODES[int(code)] for code in seen[:, 0])
-        return PlantState(
-            q, hands if separate else hands[0], modes, seen[:, 1:3], seen[:, 3], OUTCOMES[status]
+        surfaces = self._shared if packed[0] is self._arrays else of_many(packed)
+        if surfaces is None:
+            raise InputError("the surfaces of many runs are of one kind and size")
+        n, (_, number, count, _) = len(starts), hands.shape
+        settings = ManySettings(
+            surfaces,
+            records(POINT, cofs),
+            self._outline,
+            mus,
+            self.tip_radius,
+            self._points,
         )
+        course = Course(count, number, kind, done.poses.shape[1], push_out)
+        begun, way = records(POSE, starts.copy()), records(POSE, hands.reshape(-1, 3))
+        out, seen = done.poses.reshape(-1, 3).view(POSE).reshape(-1), done.seen.reshape(-1)
+        workers = 1 if n == 1 else threads or os.cpu_count() or 1
+        size = max(1, -(-n // (4 * workers)))
+
+        def chunk(first: int) -> Array:
+            room = scratch(len(self.fingers), False)
+            last = min(first + size, n)
+            many(first, last, settings, begun, way, course, out, seen, done.outcome, done.reached, room)
+            return room.hands
+
+        last = chunk(0)  # compiles, if need be, in one thread
+        _ready.add(type(surfaces))
+        if n > size:
+            with ThreadPoolExecutor(workers) as pool:
+                list(pool.map(chunk, range(size, n, size)))
+        done.hands[:] = last.view(np.float64).reshape(-1, 3)[:count]
+
+    def _state(self, done: "_Done", separate: bool) -> PlantState:
+        seen = done.seen[0, 0]
+        modes = tuple(MODES[code] for code in seen["mode"])
+        hand = done.hands if separate else done.hands[0]
+        return PlantState(
+            done.poses[0, 0], hand, modes, _points(seen), seen["gap"].copy(), OUTCOMES[done.outcome[0]]
+        )
+
+
+class _Done(NamedTuple):
+    """Runs: X_WO (n, rows, 3), SEEN rows (n, rows, k), codes and poses reached (n,), last poses of the hands (h, 3)."""
+
+    poses: Array
+    seen: SeenRows
+    outcome: Codes
+    reached: Codes
+    hands: Array
+
+
+# Steps that this process may still interpret before it compiles the kernels (a step takes about a millisecond then,
+# compiling takes longer than all of them), and the kinds of surface for which it has.
+_patience = [3000.0]
+_ready: set[type] = set()
+
+
+def _points(seen: SeenRows) -> Array:
+    return np.stack([seen["x"], seen["y"]], axis=-1)
 
 
 def _vector(values: ArrayLike, size: int, what: str) -> Array:

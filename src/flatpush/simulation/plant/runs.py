@@ -1,23 +1,13 @@
-"""Whole runs of the plain plant: what the kernels' advance, follow, push_out and many do, for any number of fingers."""
+"""Whole runs of the plain plant: what the steps' advance, follow, push_out and many do, for any number of fingers."""
 
 import numpy as np
 
-from ...contact import ContactMode
 from ...geometry import compose, inverse, log, transform, wrap_angle
 from ...geometry.pose import Array
-from .plain import TOUCH, Fingers, facing
-
-MODES = tuple(
-    mode.value
-    for mode in (
-        ContactMode.REST,
-        ContactMode.STICKING,
-        ContactMode.SLIDING_LEFT,
-        ContactMode.SLIDING_RIGHT,
-        ContactMode.SEPARATION,
-    )
-)
-OUTCOMES = ("", "jammed", "grasped", "starts inside", "too many contacts", "undecided")
+from .arrays import SeenRows
+from .codes import AS_IT_IS, BODY, MODES, OUTCOMES
+from .plain import Fingers, facing
+from .steps import TOUCH
 
 
 def push_out(fingers: Fingers, q: Array, hands: Array) -> None:
@@ -29,38 +19,34 @@ def push_out(fingers: Fingers, q: Array, hands: Array) -> None:
         q[:] = fingers.settle(q, hands, set(inside), [])
 
 
-def advance(fingers: Fingers, q: Array, hands: Array, step: Array, body: int, seen: Array) -> int:
-    """kernels.advance: moves q (3,) and hands (h, 3) in place, writes seen (k, 5), returns the outcome's code."""
-    outcome, pose, moved, modes, ways = fingers.advance(q.copy(), hands.copy(), step, bool(body))
-    q[:], hands[:] = pose, moved
-    for i, tip in enumerate(fingers.tips):
-        place = transform(inverse(q), transform(hands[i if len(hands) > 1 else 0], tip))
-        gap, point, _, _ = facing(fingers.outline, place)[0]
-        bits = sum(1 << MODES.index(mode) for mode in ways[i])
-        seen[i] = [MODES.index(modes[i]), *point, gap - fingers.radius, bits]
-    return OUTCOMES.index(outcome)
+def follow(
+    fingers: Fingers, q: Array, poses: Array, kind: int, out: Array, seen: SeenRows
+) -> tuple[int, int, Array]:
+    """steps.follow from X_WO q (3,): poses (m, h, 3), out (rows, 3), seen SEEN rows (rows, k).
 
-
-def follow(fingers: Fingers, q: Array, hands: Array, body: int, out: Array, seen: Array) -> tuple[int, int]:
-    """kernels.follow: the object, q (3,), under a hand that goes from pose to pose, hands (m, h, 3)."""
-    hand, now, bits = (
-        hands[0].copy(),
-        np.zeros((len(fingers.tips), 5)),
-        np.zeros(len(fingers.tips), dtype=int),
-    )
-    for k in range(len(hands)):
-        if body:
-            step = log(compose(inverse(hand), hands[k]))
-        else:
-            step = hands[k] - hand
-            step[:, 2] = wrap_angle(step[:, 2])
-        status = advance(fingers, q, hand, np.atleast_2d(step), body, now)
-        bits = bits | now[:, 4].astype(int)
-        out[k if len(out) > 1 else 0] = q
-        seen[k if len(seen) > 1 else 0] = now
-        if status:
-            out[k:], seen[k:] = q, now
-            break
-    if len(seen) == 1:
-        seen[0, :, 4] = bits
-    return status, k if status else len(hands)
+    Returns:
+        the outcome's code, the number of poses reached, and the hands' last poses (h, 3).
+    """
+    hands, status, reached = poses[0].copy(), 0, 0
+    step = np.zeros_like(hands)
+    modes: list[str] = []
+    ways: list[set[str]] = []
+    seen["modes"] = 0
+    for m in range(len(poses)):
+        if not status:
+            if m and kind == BODY:
+                step = np.atleast_2d(log(compose(inverse(hands), poses[m])))
+            elif m:
+                step = poses[m] - hands
+                step[:, 2] = step[:, 2] if kind == AS_IT_IS else wrap_angle(step[:, 2])
+            outcome, q, hands, modes, ways = fingers.advance(q, hands, step, kind == BODY)
+            status = OUTCOMES.index(outcome)
+            reached += not status
+        out[m if len(out) > 1 else 0] = q
+        row = seen[m if len(seen) > 1 else 0]
+        for i, tip in enumerate(fingers.tips):
+            place = transform(inverse(q), transform(hands[i if len(hands) > 1 else 0], tip))
+            gap, point, _, _ = facing(fingers.outline, place)[0]
+            bits = row[i]["modes"] | sum(1 << MODES.index(mode) for mode in ways[i])
+            row[i] = (*point, gap - fingers.radius, MODES.index(modes[i]), bits)
+    return status, reached, hands

@@ -1,35 +1,58 @@
-"""How the table resists, compiled: the wrench of a twist, the twist of a wrench, the twist of a held point.
+"""How the table resists: the wrench of a twist, the twist of a wrench, the twist of a held point.
 
-Tables as surface_table packs them: row 0 begins with the unit of length ℓ [m]; everything else is about the centre
-of friction in that unit, and so are the twists (v, ℓω) and the wrenches (f, τ/ℓ) here. Only directions of wrenches
-count. The plain versions are the limit surfaces of friction/.
+Everything is about the centre of friction in the surface's unit of length ℓ (arrays), and so are the twists (v, ℓω) and
+the wrenches (f, τ/ℓ) here. Only directions of wrenches count. The limit surfaces of friction/ say the same by arrays.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 
-from ....geometry.pose import Array
-
-ELLIPSOID, FEET, QUARTIC, EDGES, ROUND = 0, 1, 2, 3, 4
-
-part = nb.njit(cache=True, nogil=True, error_model="numpy")
+from ...formulas import by_type, formula
+from .arrays import EllipsoidArrays, FeetArrays, QuarticArrays, RoundArrays, Rows, SidesArrays
 
 _TIE = 1e-10  # as friction.exact: a force that misses a facet by less than this part of the load lies on it
 _ON_FOOT = 1e-9  # as friction.pressure: a rotation centre within this part of the radius lies on the foot
-_FAR = 16.0
-_TINY = 1e-30
+_AT_FOOT = 1e-18  # square of the distance [ℓ] below which a contact lies on a foot
+_FAR = 16.0  # as friction.pressure: from so many radii on, point loads stand for a spread pressure
+_TINY = 1e-30  # keeps the logarithms finite where a rotation centre lies on the line of a side, in radii
 
 
-@part
-def _by_nodes(table: Array, first: int, last: int, vx: float, vy: float, w: float) -> Any:
-    """h, ∇h and ∇²h summed over point loads in rows of x, y, weight."""
+class Resistance(NamedTuple):
+    """Of a twist V: the dissipation h, its wrench ∇h, and ∇²h."""
+
+    h: float
+    fx: float
+    fy: float
+    t: float
+    xx: float
+    xy: float
+    yy: float
+    xt: float
+    yt: float
+    tt: float
+
+
+class Wrench(NamedTuple):
+    """A wrench of a twist; and where that turns about a foot, its place, and the friction of its own that is free."""
+
+    fx: float
+    fy: float
+    t: float
+    free: float  # 0 where no foot is
+    x: float
+    y: float
+
+
+@formula
+def _by_nodes(nodes: Rows, vx: float, vy: float, w: float) -> Resistance:
+    """h, ∇h and ∇²h summed over point loads: h(V) = Σ w |v + ω × p|."""
     h = fx = fy = t = 0.0
     kxx = kxy = kyy = kxt = kyt = ktt = 0.0
-    for i in range(first, last):
-        x, y, share = table[i, 0], table[i, 1], table[i, 2]
+    for i in range(len(nodes)):
+        node = nodes[i]
+        x, y, share = node.x, node.y, node.weight
         ax, ay = vx - w * y, vy + w * x
         speed = math.sqrt(ax * ax + ay * ay)
         if speed <= 1e-15 * abs(w):
@@ -47,22 +70,22 @@ def _by_nodes(table: Array, first: int, last: int, vx: float, vy: float, w: floa
         kxt -= c * uy * along
         kyt += c * ux * along
         ktt += c * along * along
-    return h, fx, fy, t, kxx, kxy, kyy, kxt, kyt, ktt
+    return Resistance(h, fx, fy, t, kxx, kxy, kyy, kxt, kyt, ktt)
 
 
-@part
-def _edge_integrals(table: Array, cx: float, cy: float) -> Any:
+@formula
+def _sides_integrals(surface: SidesArrays, cx: float, cy: float) -> Any:
     """U, G, M of a uniform pressure on a polygon's outline, or inside it (friction.pressure.Edges)."""
-    filled, size = table[0, 2] > 0.5, table[0, 3]
-    count, radius = int(table[0, 4]), table[0, 1]
+    size = surface.size
     U = gx = gy = mxx = mxy = myy = 0.0
-    for i in range(1, 1 + count):
-        ex, ey, t0, t1, d0 = table[i, 0], table[i, 1], table[i, 2], table[i, 3], table[i, 4]
+    for i in range(len(surface.sides)):
+        side = surface.sides[i]
+        ex, ey = side.ex, side.ey
         nx, ny = ey, -ex
         shift = cx * ex + cy * ey
-        t0, t1 = t0 - shift, t1 - shift
-        d = d0 - (cx * nx + cy * ny)
-        gap = max(abs(d), _TINY * radius)
+        t0, t1 = side.first - shift, side.last - shift
+        d = side.distance - (cx * nx + cy * ny)
+        gap = max(abs(d), _TINY * surface.radius)
         r0, r1 = math.sqrt(t0 * t0 + gap * gap), math.sqrt(t1 * t1 + gap * gap)
         # asinh(t1/gap) - asinh(t0/gap), each as a logarithm without cancellation
         a1 = math.log((abs(t1) + r1) / gap)
@@ -72,7 +95,7 @@ def _edge_integrals(table: Array, cx: float, cy: float) -> Any:
         gn = d * L
         u = t1 * r1 - t0 * r0 + d * gn
         ee = L - nn
-        if filled:
+        if surface.filled:
             u *= d / 3
             gn *= 0.5 * d
             ge *= 0.5 * d
@@ -88,11 +111,11 @@ def _edge_integrals(table: Array, cx: float, cy: float) -> Any:
     return 0.5 * U / size, gx / size, gy / size, mxx / size, mxy / size, myy / size
 
 
-@part
-def _round_integrals(table: Array, cx: float, cy: float) -> Any:
+@formula
+def _round_integrals(surface: RoundArrays, cx: float, cy: float) -> Any:
     """U, G, M of a uniform pressure on a circle, or inside it (friction.pressure.Round)."""
-    a, filled = table[0, 1], table[0, 2] > 0.5
-    cx, cy = cx - table[0, 5], cy - table[0, 6]
+    a = surface.radius
+    cx, cy = cx - surface.x, cy - surface.y
     c = math.sqrt(cx * cx + cy * cy)
     s, inside = max(a, c), c <= a
     k = min(a, c) / s
@@ -110,7 +133,7 @@ def _round_integrals(table: Array, cx: float, cy: float) -> Any:
     D = K * (1 + total) / 2
     B = K - D
     k1 = abs(a - c) * (a + c) / (s * s)
-    if filled:
+    if surface.filled:
         f = 4 / (3 * math.pi)
         U = f * s / 3 * ((3 + 5 * m) * B + (3 + m) * k1 * D if inside else (5 + 3 * m) * B + 4 * k1 * D)
         over = f / s * (2 * B + k1 * D)
@@ -131,24 +154,23 @@ def _round_integrals(table: Array, cx: float, cy: float) -> Any:
     )
 
 
-@part
-def resist(kind: int, table: Array, vx: float, vy: float, w: float) -> Any:
-    """h, ∇h (3) and ∇²h (xx, xy, yy, xt, yt, tt) of a twist, for the supports (not ellipsoid or quartic)."""
-    if kind == FEET:
-        return _by_nodes(table, 1, table.shape[0], vx, vy, w)
-    ax, ay = vx - w * table[0, 6], vy + w * table[0, 5]
-    if ax * ax + ay * ay >= (_FAR * table[0, 1] * w) ** 2:
-        return _by_nodes(table, 1 + int(table[0, 4]), table.shape[0], vx, vy, w)
+@formula
+def _feet_resist(surface: FeetArrays, vx: float, vy: float, w: float) -> Resistance:
+    return _by_nodes(surface.feet, vx, vy, w)
+
+
+@formula
+def _spread_resist(surface: SidesArrays | RoundArrays, vx: float, vy: float, w: float) -> Resistance:
+    ax, ay = vx - w * surface.y, vy + w * surface.x
+    if ax * ax + ay * ay >= (_FAR * surface.radius * w) ** 2:
+        return _by_nodes(surface.nodes, vx, vy, w)
     cx, cy = -vy / w, vx / w
-    if kind == EDGES:
-        U, gx, gy, mxx, mxy, myy = _edge_integrals(table, cx, cy)
-    else:
-        U, gx, gy, mxx, mxy, myy = _round_integrals(table, cx, cy)
+    U, gx, gy, mxx, mxy, myy = _integrals(surface, cx, cy)
     size = abs(w)
     sign = 1.0 if w > 0 else -1.0
     lx, ly = -cy, cx
     sx, sy = mxx * lx + mxy * ly, mxy * lx + myy * ly
-    return (
+    return Resistance(
         size * U,
         -gy * sign,
         gx * sign,
@@ -162,28 +184,48 @@ def resist(kind: int, table: Array, vx: float, vy: float, w: float) -> Any:
     )
 
 
-@part
-def _quartic_hessian(table: Array, x: float, y: float, z: float) -> Any:
+_integrals = by_type({SidesArrays: _sides_integrals, RoundArrays: _round_integrals})
+resist = by_type({FeetArrays: _feet_resist, SidesArrays: _spread_resist, RoundArrays: _spread_resist})
+"""The Resistance of a support to a twist."""
+
+
+@formula
+def _quartic_hessian(surface: QuarticArrays, x: float, y: float, z: float) -> Any:
     """∇²H/12 of the quartic (xx, xy, yy, xz, yz, zz)."""
-    v = table[1]
+    v = surface.terms[0]
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-    hxx = v[0] * xx + 0.5 * (v[3] * xy + v[4] * xz) + (v[9] * yy + v[10] * zz + v[12] * yz) / 6
-    hyy = v[1] * yy + 0.5 * (v[5] * xy + v[6] * yz) + (v[9] * xx + v[11] * zz + v[13] * xz) / 6
-    hzz = v[2] * zz + 0.5 * (v[7] * xz + v[8] * yz) + (v[10] * xx + v[11] * yy + v[14] * xy) / 6
-    hxy = 0.25 * (v[3] * xx + v[5] * yy) + v[9] * xy / 3 + (v[12] * xz + v[13] * yz) / 6 + v[14] * zz / 12
-    hxz = 0.25 * (v[4] * xx + v[7] * zz) + v[10] * xz / 3 + (v[12] * xy + v[14] * yz) / 6 + v[13] * yy / 12
-    hyz = 0.25 * (v[6] * yy + v[8] * zz) + v[11] * yz / 3 + (v[13] * xy + v[14] * xz) / 6 + v[12] * xx / 12
+    hxx = v.xxxx * xx + 0.5 * (v.xxxy * xy + v.xxxz * xz) + (v.xxyy * yy + v.xxzz * zz + v.xxyz * yz) / 6
+    hyy = v.yyyy * yy + 0.5 * (v.yyyx * xy + v.yyyz * yz) + (v.xxyy * xx + v.yyzz * zz + v.yyxz * xz) / 6
+    hzz = v.zzzz * zz + 0.5 * (v.zzzx * xz + v.zzzy * yz) + (v.xxzz * xx + v.yyzz * yy + v.zzxy * xy) / 6
+    hxy = (
+        0.25 * (v.xxxy * xx + v.yyyx * yy)
+        + v.xxyy * xy / 3
+        + (v.xxyz * xz + v.yyxz * yz) / 6
+        + v.zzxy * zz / 12
+    )
+    hxz = (
+        0.25 * (v.xxxz * xx + v.zzzx * zz)
+        + v.xxzz * xz / 3
+        + (v.xxyz * xy + v.zzxy * yz) / 6
+        + v.yyxz * yy / 12
+    )
+    hyz = (
+        0.25 * (v.yyyz * yy + v.zzzy * zz)
+        + v.yyzz * yz / 3
+        + (v.yyxz * xy + v.zzxy * xz) / 6
+        + v.xxyz * xx / 12
+    )
     return hxx, hxy, hyy, hxz, hyz, hzz
 
 
-@part
-def _quartic_wrench(table: Array, bx: float, by: float, bz: float) -> Any:
+@formula
+def _quartic_root(surface: QuarticArrays, bx: float, by: float, bz: float) -> Any:
     """The F of least H(F) - b·F by damped Newton, as friction.quartic."""
     size = math.sqrt(bx * bx + by * by + bz * bz)
     bx, by, bz = bx / size, by / size, bz / size
     x, y, z = bx, by, bz
     for k in range(100):
-        a, b, c, d, e, f = _quartic_hessian(table, x, y, z)
+        a, b, c, d, e, f = _quartic_hessian(surface, x, y, z)
         if k == 0:
             power, value = (
                 1.0,
@@ -211,7 +253,7 @@ def _quartic_wrench(table: Array, bx: float, by: float, bz: float) -> Any:
         fraction, moved = 1.0, False
         while fraction > 1e-6:
             x1, y1, z1 = x + fraction * sx, y + fraction * sy, z + fraction * sz
-            a, b, c, d, e, f = _quartic_hessian(table, x1, y1, z1)
+            a, b, c, d, e, f = _quartic_hessian(surface, x1, y1, z1)
             p1 = bx * x1 + by * y1 + bz * z1
             if p1 > 0:
                 value = (
@@ -241,15 +283,15 @@ def _quartic_wrench(table: Array, bx: float, by: float, bz: float) -> Any:
     return x, y, z
 
 
-@part
-def _quartic_stick(table: Array, px: float, py: float, ux: float, uy: float) -> Any:
+@formula
+def _quartic_held(surface: QuarticArrays, px: float, py: float, ux: float, uy: float) -> Any:
     """The force f at a point for which it moves with u: least H(Jᵀf) - u·f, damped Newton in the plane."""
     speed = math.sqrt(ux * ux + uy * uy)
     ux, uy = ux / speed, uy / speed
     x, y = ux, uy
     for k in range(100):
         z = px * y - py * x
-        a, b, c, d, e, f = _quartic_hessian(table, x, y, z)
+        a, b, c, d, e, f = _quartic_hessian(surface, x, y, z)
         # Gᵀ M G with the columns (1, 0, -py) and (0, 1, px).
         gxx = a - 2 * py * d + py * py * f
         gxy = b + px * d - py * e - px * py * f
@@ -272,7 +314,7 @@ def _quartic_stick(table: Array, px: float, py: float, ux: float, uy: float) -> 
             x1, y1 = x + fraction * sx, y + fraction * sy
             p1 = ux * x1 + uy * y1
             if p1 > 0:
-                a, b, c, d, e, f = _quartic_hessian(table, x1, y1, px * y1 - py * x1)
+                a, b, c, d, e, f = _quartic_hessian(surface, x1, y1, px * y1 - py * x1)
                 gxx = a - 2 * py * d + py * py * f
                 gxy = b + px * d - py * e - px * py * f
                 gyy = c + 2 * px * e + px * px * f
@@ -290,89 +332,112 @@ def _quartic_stick(table: Array, px: float, py: float, ux: float, uy: float) -> 
             break
         x, y = x1, y1
     z = px * y - py * x
-    a, b, c, d, e, f = _quartic_hessian(table, x, y, z)
+    a, b, c, d, e, f = _quartic_hessian(surface, x, y, z)
     vx, vy, w = a * x + b * y + d * z, b * x + c * y + e * z, d * x + e * y + f * z
     t = 4 * speed
     return t * vx, t * vy, t * w, x, y
 
 
-@part
-def foot_of(kind: int, table: Array, vx: float, vy: float, w: float) -> Any:
-    """The row of the foot that a twist turns about, or 0."""
-    if kind == FEET and w != 0.0:
-        limit = _ON_FOOT * table[0, 1] * abs(w)
-        for i in range(1, table.shape[0]):
-            if math.hypot(vx - w * table[i, 1], vy + w * table[i, 0]) <= limit:
-                return i
-    return 0
+@formula
+def _ellipsoid_wrench(surface: EllipsoidArrays, vx: float, vy: float, w: float) -> Wrench:
+    A = surface.ellipse[0]
+    fx, fy = A.ixx * vx + A.ixy * vy + A.ixt * w, A.ixy * vx + A.iyy * vy + A.iyt * w
+    return Wrench(fx, fy, A.ixt * vx + A.iyt * vy + A.itt * w, 0.0, 0.0, 0.0)
 
 
-@part
-def wrench_of(kind: int, table: Array, vx: float, vy: float, w: float) -> Any:
-    """A wrench of a twist, and the row of a foot whose own friction (up to its weight) is free, or 0.
-
-    Of the load's size where there is such a foot.
-    """
-    if kind == ELLIPSOID:
-        return (
-            table[4, 0] * vx + table[4, 1] * vy + table[4, 2] * w,
-            table[5, 0] * vx + table[5, 1] * vy + table[5, 2] * w,
-            table[6, 0] * vx + table[6, 1] * vy + table[6, 2] * w,
-            0,
-        )
-    if kind == QUARTIC:
-        x, y, z = _quartic_wrench(table, vx, vy, w)
-        return x, y, z, 0
-    foot = foot_of(kind, table, vx, vy, w)
-    if foot > 0:
-        sign = 1.0 if w > 0 else -1.0
-        return sign * table[foot, 4], sign * table[foot, 5], sign * table[foot, 6], foot
-    r = resist(kind, table, vx, vy, w)
-    return r[1], r[2], r[3], 0
+@formula
+def _quartic_wrench(surface: QuarticArrays, vx: float, vy: float, w: float) -> Wrench:
+    x, y, z = _quartic_root(surface, vx, vy, w)
+    return Wrench(x, y, z, 0.0, 0.0, 0.0)
 
 
-@part
-def stick_of(kind: int, table: Array, px: float, py: float, ux: float, uy: float) -> Any:
-    """The twist of the body whose point p is held to the velocity u by a force through it: LimitSurface.stick."""
+@formula
+def _feet_wrench(surface: FeetArrays, vx: float, vy: float, w: float) -> Wrench:
+    if w != 0.0:
+        limit = _ON_FOOT * surface.radius * abs(w)
+        for i in range(len(surface.feet)):
+            foot = surface.feet[i]
+            if math.hypot(vx - w * foot.y, vy + w * foot.x) <= limit:
+                sign = 1.0 if w > 0 else -1.0
+                return Wrench(sign * foot.fx, sign * foot.fy, sign * foot.t, foot.weight, foot.x, foot.y)
+    r = _by_nodes(surface.feet, vx, vy, w)
+    return Wrench(r.fx, r.fy, r.t, 0.0, 0.0, 0.0)
+
+
+@formula
+def _spread_wrench(surface: SidesArrays | RoundArrays, vx: float, vy: float, w: float) -> Wrench:
+    r = _spread_resist(surface, vx, vy, w)
+    return Wrench(r.fx, r.fy, r.t, 0.0, 0.0, 0.0)
+
+
+wrench_of = by_type(
+    {
+        EllipsoidArrays: _ellipsoid_wrench,
+        QuarticArrays: _quartic_wrench,
+        FeetArrays: _feet_wrench,
+        SidesArrays: _spread_wrench,
+        RoundArrays: _spread_wrench,
+    }
+)
+"""A wrench of a twist, of the load's size where it turns about a foot: LimitSurface.wrench_set."""
+
+
+@formula
+def _ellipsoid_stick(surface: EllipsoidArrays, px: float, py: float, ux: float, uy: float) -> Any:
+    # f from J A Jᵀ f = u, then A Jᵀ f: [Zhou2017] Eq. 13 inverted.
+    A = surface.ellipse[0]
+    xx = A.xx - 2 * py * A.xt + py * py * A.tt
+    xy = A.xy + px * A.xt - py * A.yt - px * py * A.tt
+    yy = A.yy + 2 * px * A.yt + px * px * A.tt
+    det = xx * yy - xy * xy
+    fx, fy = (yy * ux - xy * uy) / det, (xx * uy - xy * ux) / det
+    return _ellipsoid_twist(surface, fx, fy, px * fy - py * fx)
+
+
+@formula
+def _quartic_stick(surface: QuarticArrays, px: float, py: float, ux: float, uy: float) -> Any:
+    if ux == 0.0 and uy == 0.0:
+        return 0.0, 0.0, 0.0
+    vx, vy, w, _, _ = _quartic_held(surface, px, py, ux, uy)
+    return vx, vy, w
+
+
+@formula
+def _feet_stick(surface: FeetArrays, px: float, py: float, ux: float, uy: float) -> Any:
     speed = math.sqrt(ux * ux + uy * uy)
     if speed == 0.0:
         return 0.0, 0.0, 0.0
-    if kind == ELLIPSOID:
-        # f from J A Jᵀ f = u, then A Jᵀ f.
-        a, b, d = table[1, 0], table[1, 1], table[1, 2]
-        c, e, f = table[2, 1], table[2, 2], table[3, 2]
-        xx = a - 2 * py * d + py * py * f
-        xy = b + px * d - py * e - px * py * f
-        yy = c + 2 * px * e + px * px * f
-        det = xx * yy - xy * xy
-        fx, fy = (yy * ux - xy * uy) / det, (xx * uy - xy * ux) / det
-        t = px * fy - py * fx
-        return a * fx + b * fy + d * t, b * fx + c * fy + e * t, d * fx + e * fy + f * t
-    if kind == QUARTIC:
-        vx, vy, w, _, _ = _quartic_stick(table, px, py, ux, uy)
-        return vx, vy, w
-    ux, uy = ux / speed, uy / speed
-    if kind == FEET:
-        limit = _ON_FOOT * table[0, 1]
-        for i in range(1, table.shape[0]):
-            ax, ay = px - table[i, 0], py - table[i, 1]
-            if abs(ax * ux + ay * uy) <= limit:
-                square = ax * ax + ay * ay
-                if square > 1e-18:
+    limit = _ON_FOOT * surface.radius * speed
+    for i in range(len(surface.feet)):
+        foot = surface.feet[i]
+        ax, ay = px - foot.x, py - foot.y
+        if abs(ax * ux + ay * uy) <= limit:
+            square = ax * ax + ay * ay
+            if square > _AT_FOOT:
+                missing = py * foot.fx - px * foot.fy + foot.t
+                if abs(missing) <= foot.weight * math.sqrt(square) + _TIE:
                     w = (ax * uy - ay * ux) / square
-                    missing = py * table[i, 4] - px * table[i, 5] + table[i, 6]
-                    if abs(missing) <= table[i, 2] * math.sqrt(square) + _TIE:
-                        w *= speed
-                        return w * table[i, 1], -w * table[i, 0], w
+                    return w * foot.y, -w * foot.x, w
+    return _spread_stick(surface, px, py, ux, uy)
+
+
+@formula
+def _spread_stick(
+    surface: FeetArrays | SidesArrays | RoundArrays, px: float, py: float, ux: float, uy: float
+) -> Any:
+    speed = math.sqrt(ux * ux + uy * uy)
+    if speed == 0.0:
+        return 0.0, 0.0, 0.0
+    ux, uy = ux / speed, uy / speed
     # V = (u, 0) + ω k with k the rotation about p: h is least where k·∇h = 0.
     arm2 = px * px + py * py + 1.0
     arm = math.sqrt(arm2)
     w = (px * uy - py * ux) / arm2
     low, high, before = -np.inf, np.inf, np.inf
     for _ in range(200):
-        r = resist(kind, table, ux + w * py, uy - w * px, w)
-        slope = py * r[1] - px * r[2] + r[3]
-        bend = py * py * r[4] - 2 * px * py * r[5] + px * px * r[6] + 2 * (py * r[7] - px * r[8]) + r[9]
+        r = resist(surface, ux + w * py, uy - w * px, w)
+        slope = py * r.fx - px * r.fy + r.t
+        bend = py * py * r.xx - 2 * px * py * r.xy + px * px * r.yy + 2 * (py * r.xt - px * r.yt) + r.tt
         if abs(slope) <= 4e-16 * arm:
             break
         if slope < 0:
@@ -397,8 +462,8 @@ def stick_of(kind: int, table: Array, px: float, py: float, ux: float, uy: float
     return speed * (ux + w * py), speed * (uy - w * px), speed * w
 
 
-@part
-def _newton(kind: int, table: Array, fx: float, fy: float, t: float) -> Any:
+@formula
+def _newton(surface: FeetArrays | SidesArrays | RoundArrays, fx: float, fy: float, t: float) -> Any:
     """The V of least h(V) over F·V = 1 by damped Newton from V = F (a unit wrench), and the residual."""
     # An orthonormal basis a, b of the plane normal to F.
     if abs(fx) <= abs(fy) and abs(fx) <= abs(t):
@@ -413,21 +478,21 @@ def _newton(kind: int, table: Array, fx: float, fy: float, t: float) -> Any:
     ax, ay, at = ax / size, ay / size, at / size
     bx, by, bt = fy * at - t * ay, t * ax - fx * at, fx * ay - fy * ax
     vx, vy, w = fx, fy, t
-    r = resist(kind, table, vx, vy, w)
-    g1, g2 = ax * r[1] + ay * r[2] + at * r[3], bx * r[1] + by * r[2] + bt * r[3]
+    r = resist(surface, vx, vy, w)
+    g1, g2 = ax * r.fx + ay * r.fy + at * r.t, bx * r.fx + by * r.fy + bt * r.t
     for _ in range(60):
         square = g1 * g1 + g2 * g2
-        if square <= (4e-15 * r[0]) ** 2:
+        if square <= (4e-15 * r.h) ** 2:
             break
         kax, kay, kat = (
-            r[4] * ax + r[5] * ay + r[7] * at,
-            r[5] * ax + r[6] * ay + r[8] * at,
-            r[7] * ax + r[8] * ay + r[9] * at,
+            r.xx * ax + r.xy * ay + r.xt * at,
+            r.xy * ax + r.yy * ay + r.yt * at,
+            r.xt * ax + r.yt * ay + r.tt * at,
         )
         kbx, kby, kbt = (
-            r[4] * bx + r[5] * by + r[7] * bt,
-            r[5] * bx + r[6] * by + r[8] * bt,
-            r[7] * bx + r[8] * by + r[9] * bt,
+            r.xx * bx + r.xy * by + r.xt * bt,
+            r.xy * bx + r.yy * by + r.yt * bt,
+            r.xt * bx + r.yt * by + r.tt * bt,
         )
         haa, hab, hbb = (
             ax * kax + ay * kay + at * kat,
@@ -449,46 +514,60 @@ def _newton(kind: int, table: Array, fx: float, fy: float, t: float) -> Any:
         while fraction > 1e-9:
             p, q = fraction * s1, fraction * s2
             x, y, z = vx + p * ax + q * bx, vy + p * ay + q * by, w + p * at + q * bt
-            r1 = resist(kind, table, x, y, z)
-            n1, n2 = ax * r1[1] + ay * r1[2] + at * r1[3], bx * r1[1] + by * r1[2] + bt * r1[3]
+            r1 = resist(surface, x, y, z)
+            n1, n2 = ax * r1.fx + ay * r1.fy + at * r1.t, bx * r1.fx + by * r1.fy + bt * r1.t
             slope = n1 * s1 + n2 * s2
-            if slope <= 0 or r1[0] <= r[0] + 1e-4 * fraction * descent:
+            if slope <= 0 or r1.h <= r.h + 1e-4 * fraction * descent:
                 moved = True
-            elif slope <= -descent / 2 and r1[0] <= r[0] * (1 + 1e-12):
+            elif slope <= -descent / 2 and r1.h <= r.h * (1 + 1e-12):
                 moved = n1 * n1 + n2 * n2 < square
-            if moved or square <= (1e-12 * r[0]) ** 2:
+            if moved or square <= (1e-12 * r.h) ** 2:
                 break
             fraction *= 0.5
-        if not moved or (square <= (1e-12 * r[0]) ** 2 and n1 * n1 + n2 * n2 >= square):
+        if not moved or (square <= (1e-12 * r.h) ** 2 and n1 * n1 + n2 * n2 >= square):
             break
         vx, vy, w, r, g1, g2 = x, y, z, r1, n1, n2
-    return vx, vy, w, math.sqrt(g1 * g1 + g2 * g2) / r[0]
+    return vx, vy, w, math.sqrt(g1 * g1 + g2 * g2) / r.h
 
 
-@part
-def twist_of(kind: int, table: Array, fx: float, fy: float, t: float) -> Any:
-    """A twist of a wrench: LimitSurface.twist (not for collinear feet)."""
-    if kind == ELLIPSOID:
-        return (
-            table[1, 0] * fx + table[1, 1] * fy + table[1, 2] * t,
-            table[2, 0] * fx + table[2, 1] * fy + table[2, 2] * t,
-            table[3, 0] * fx + table[3, 1] * fy + table[3, 2] * t,
-        )
-    if kind == QUARTIC:
-        a, b, c, d, e, f = _quartic_hessian(table, fx, fy, t)
-        return a * fx + b * fy + d * t, b * fx + c * fy + e * t, d * fx + e * fy + f * t
+@formula
+def _ellipsoid_twist(surface: EllipsoidArrays, fx: float, fy: float, t: float) -> Any:
+    A = surface.ellipse[0]
+    return (
+        A.xx * fx + A.xy * fy + A.xt * t,
+        A.xy * fx + A.yy * fy + A.yt * t,
+        A.xt * fx + A.yt * fy + A.tt * t,
+    )
+
+
+@formula
+def _quartic_twist(surface: QuarticArrays, fx: float, fy: float, t: float) -> Any:
+    a, b, c, d, e, f = _quartic_hessian(surface, fx, fy, t)
+    return a * fx + b * fy + d * t, b * fx + c * fy + e * t, d * fx + e * fy + f * t
+
+
+@formula
+def _feet_twist(surface: FeetArrays, fx: float, fy: float, t: float) -> Any:
+    # Each foot has a facet of wrenches: those of the rotation about it, its own friction free.
     size = math.sqrt(fx * fx + fy * fy + t * t)
     fx, fy, t = fx / size, fy / size, t / size
-    if kind == FEET:
-        for i in range(1, table.shape[0]):
-            power = table[i, 1] * fx - table[i, 0] * fy + t
-            if power != 0.0:
-                scale = table[i, 3] / power
-                gx, gy = scale * fx - table[i, 4], scale * fy - table[i, 5]
-                if math.sqrt(gx * gx + gy * gy) <= table[i, 2] + _TIE:
-                    sign = 1.0 if power > 0 else -1.0
-                    return sign * table[i, 1], -sign * table[i, 0], sign
-    vx, vy, w, residual = _newton(kind, table, fx, fy, t)
+    for i in range(len(surface.feet)):
+        foot = surface.feet[i]
+        power = foot.y * fx - foot.x * fy + t
+        if power != 0.0:
+            scale = foot.power / power
+            gx, gy = scale * fx - foot.fx, scale * fy - foot.fy
+            if math.sqrt(gx * gx + gy * gy) <= foot.weight + _TIE:
+                sign = 1.0 if power > 0 else -1.0
+                return sign * foot.y, -sign * foot.x, sign
+    return _spread_twist(surface, fx, fy, t)
+
+
+@formula
+def _spread_twist(surface: FeetArrays | SidesArrays | RoundArrays, fx: float, fy: float, t: float) -> Any:
+    size = math.sqrt(fx * fx + fy * fy + t * t)
+    fx, fy, t = fx / size, fy / size, t / size
+    vx, vy, w, residual = _newton(surface, fx, fy, t)
     force = math.sqrt(fx * fx + fy * fy)
     if residual <= 1e-11 or force < 1e-9:
         return vx, vy, w
@@ -499,12 +578,35 @@ def twist_of(kind: int, table: Array, fx: float, fy: float, t: float) -> Any:
     for _ in range(80):
         middle = 0.5 * (low + high)
         c, s = math.cos(middle), math.sin(middle)
-        vx, vy, w = stick_of(kind, table, px, py, c * dx - s * dy, s * dx + c * dy)
-        r = resist(kind, table, vx, vy, w)
-        if dx * r[2] - dy * r[1] < 0:
+        vx, vy, w = stick_of(surface, px, py, c * dx - s * dy, s * dx + c * dy)
+        r = resist(surface, vx, vy, w)
+        if dx * r.fy - dy * r.fx < 0:
             low = middle
         else:
             high = middle
         if high - low <= 1e-15:
             break
     return vx, vy, w
+
+
+stick_of = by_type(
+    {
+        EllipsoidArrays: _ellipsoid_stick,
+        QuarticArrays: _quartic_stick,
+        FeetArrays: _feet_stick,
+        SidesArrays: _spread_stick,
+        RoundArrays: _spread_stick,
+    }
+)
+"""The twist of the body whose point p is held to the velocity u by a force through it: LimitSurface.stick."""
+
+twist_of = by_type(
+    {
+        EllipsoidArrays: _ellipsoid_twist,
+        QuarticArrays: _quartic_twist,
+        FeetArrays: _feet_twist,
+        SidesArrays: _spread_twist,
+        RoundArrays: _spread_twist,
+    }
+)
+"""A twist of a wrench: LimitSurface.twist."""

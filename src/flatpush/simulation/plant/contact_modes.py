@@ -1,36 +1,36 @@
-"""What one or two contacts do to the object at one moment, compiled.
+"""What one or two contacts do to the object at one moment.
 
-Lengths in the table's unit ℓ, everything about the centre of friction, twists (v, ℓω). The plain versions are
-PointContact.motion for one contact and contact.several for any number.
+Lengths in the surface's unit ℓ, everything about the centre of friction, twists (v, ℓω). PointContact.motion says the
+same of one contact, and contact.several of any number.
 """
 
 import math
 from typing import Any
 
-import numba as nb
 import numpy as np
 
-from ....geometry.pose import Array
-from ..table.kernels import stick_of, twist_of, wrench_of
-
-REST, STICKING, LEFT, RIGHT, SEPARATION = 0, 1, 2, 3, 4
-GOING, JAMMED, UNDECIDED = 0, 1, 5
-
-part = nb.njit(cache=True, nogil=True, error_model="numpy")
+from ...formulas import formula
+from .arrays import Row, Rows, Scratch, SurfaceArrays
+from .codes import GOING, JAMMED, LEFT, REST, RIGHT, SEPARATION, STICKING, UNDECIDED
+from .resistance import Wrench, stick_of, twist_of, wrench_of
 
 _CLOSED = 1e-9  # relative slack of a closed cone
-_ANGLE = 1e-12
-_ROOT = 60
+_LOOSE = (
+    1e-6  # part of a wrench that may be missing where both slide: the root is only so sharp beside a facet
+)
+_ANGLE = 1e-12  # [rad] slack of the friction cone's edge
+_SAME = 1e-9  # [ℓ] points nearer than this are one
+_ROOT = 60  # half the iterations that a root of both slips may take
 
 
-@part
-def _chord(table: Array, foot: int, px: float, py: float, fx: float, fy: float, t: float) -> Any:
+@formula
+def _chord(wrench: Wrench, px: float, py: float) -> Any:
     """The forces at p between which all lie that make a wrench of a rotation about a foot: PointContact.forces."""
-    radius = table[foot, 2]
-    dx, dy = table[foot, 0] - px, table[foot, 1] - py
-    torque = t - (px * fy - py * fx)
+    radius, fx, fy = wrench.free, wrench.fx, wrench.fy
+    dx, dy = wrench.x - px, wrench.y - py
+    torque = wrench.t - (px * fy - py * fx)
     distance = math.sqrt(dx * dx + dy * dy)
-    if distance < 1e-9:
+    if distance < _SAME:
         size = math.sqrt(fx * fx + fy * fy)
         spread = math.asin(min(1.0, radius / size)) if size > 0 else math.pi
         c, s = math.cos(spread), math.sin(spread)
@@ -43,34 +43,35 @@ def _chord(table: Array, foot: int, px: float, py: float, fx: float, fy: float, 
     return x + hx, y + hy, x - hx, y - hy
 
 
-@part
+@formula
 def _angles(
-    kind: int, table: Array, px: float, py: float, nx: float, ny: float, vx: float, vy: float, w: float
+    surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, vx: float, vy: float, w: float
 ) -> Any:
     """Least and largest angle from the normal of the contact forces that make a wrench of a twist."""
-    fx, fy, t, foot = wrench_of(kind, table, vx, vy, w)
-    if foot == 0:
+    wrench = wrench_of(surface, vx, vy, w)
+    fx, fy = wrench.fx, wrench.fy
+    if wrench.free == 0.0:
         angle = math.atan2(nx * fy - ny * fx, nx * fx + ny * fy)
         return angle, angle
-    ax, ay, bx, by = _chord(table, foot, px, py, fx, fy, t)
+    ax, ay, bx, by = _chord(wrench, px, py)
     a = math.atan2(nx * ay - ny * ax, nx * ax + ny * ay)
     b = math.atan2(nx * by - ny * bx, nx * bx + ny * by)
     return min(a, b), max(a, b)
 
 
-@part
+@formula
 def edge_twist(
-    kind: int, table: Array, px: float, py: float, nx: float, ny: float, mu: float, left: bool
+    surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, mu: float, left: bool
 ) -> Any:
     """A twist under the force on the left or right edge of the friction cone, such that ∇H is as it comes."""
     tangent = mu if left else -mu
     fx, fy = nx - tangent * ny, ny + tangent * nx
-    return twist_of(kind, table, fx, fy, px * fy - py * fx)
+    return twist_of(surface, fx, fy, px * fy - py * fx)
 
 
-@part
+@formula
 def one(
-    kind: int, table: Array, px: float, py: float, nx: float, ny: float, ux: float, uy: float, mu: float
+    surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, ux: float, uy: float, mu: float
 ) -> Any:
     """PointContact.motion: mode, twist (3) and slip."""
     speed = math.sqrt(ux * ux + uy * uy)
@@ -83,49 +84,56 @@ def one(
         left = side > 0
         still = mu == 0.0
         if not still:
-            vx, vy, w = edge_twist(kind, table, px, py, nx, ny, mu, left)
+            vx, vy, w = edge_twist(surface, px, py, nx, ny, mu, left)
             still = (vx - w * py) * nx + (vy + w * px) * ny >= 0
         if still:
             return (LEFT if left else RIGHT), 0.0, 0.0, 0.0, side
     half = math.atan(mu)
-    vx, vy, w = stick_of(kind, table, px, py, ux, uy)
-    low, high = _angles(kind, table, px, py, nx, ny, vx, vy, w)
+    vx, vy, w = stick_of(surface, px, py, ux, uy)
+    low, high = _angles(surface, px, py, nx, ny, vx, vy, w)
     if high >= -half - _ANGLE and low <= half + _ANGLE:
         return STICKING, vx, vy, w, 0.0
     left = low > 0
-    vx, vy, w = edge_twist(kind, table, px, py, nx, ny, mu, left)
+    vx, vy, w = edge_twist(surface, px, py, nx, ny, mu, left)
     scale = approach / ((vx - w * py) * nx + (vy + w * px) * ny)
     vx, vy, w = scale * vx, scale * vy, scale * w
     slip = nx * (uy - vy - w * px) - ny * (ux - vx + w * py)
     return (LEFT if left else RIGHT), vx, vy, w, slip
 
 
-@part
-def _ray(rays: Array, i: int, px: float, py: float, nx: float, ny: float, tangent: float) -> Any:
-    fx, fy = nx - tangent * ny, ny + tangent * nx
-    t = px * fy - py * fx
+@formula
+def _edge_wrench(at: Row, tangent: float) -> Any:
+    """The wrench of the force at a contact whose tangential part, to the left, is so many times its normal part."""
+    fx, fy = at.nx - tangent * at.ny, at.ny + tangent * at.nx
+    return fx, fy, at.x * fy - at.y * fx
+
+
+@formula
+def _set_ray(ray: Row, at: Row, tangent: float) -> None:
+    """Writes the unit wrench of an edge of the friction cone of a contact."""
+    fx, fy, t = _edge_wrench(at, tangent)
     size = math.sqrt(fx * fx + fy * fy + t * t)
-    rays[i, 0], rays[i, 1], rays[i, 2] = fx / size, fy / size, t / size
+    ray.x, ray.y, ray.t = fx / size, fy / size, t / size
 
 
-@part
-def _holds(kind: int, table: Array, vx: float, vy: float, w: float, rays: Array, count: int) -> Any:
+@formula
+def _holds(surface: SurfaceArrays, vx: float, vy: float, w: float, scratch: Scratch, count: int) -> Any:
     """Whether some wrench of a twist lies in the closed cone of the unit rays (count, 3), which span space.
 
     The cone's faces are planes through two of its rays that leave no other behind them. About a foot's free force g
     each is a half-plane, and what is asked for is their point nearest to g = 0.
     """
-    fx, fy, t, foot = wrench_of(kind, table, vx, vy, w)
+    wrench = wrench_of(surface, vx, vy, w)
+    fx, fy, t, at_foot = wrench.fx, wrench.fy, wrench.t, wrench.free > 0.0
     size = math.sqrt(fx * fx + fy * fy + t * t)
-    if foot == 0:
+    if not at_foot:
         fx, fy, t = fx / size, fy / size, t / size
-    planes = rays[4:]  # of the free force: a·g ≥ b
+    rays, planes = scratch.rays, scratch.planes  # planes: of the free force g, (x, y)·g ≥ t
     found = 0
     for i in range(count):
         for j in range(i + 1, count):
-            mx = rays[i, 1] * rays[j, 2] - rays[i, 2] * rays[j, 1]
-            my = rays[i, 2] * rays[j, 0] - rays[i, 0] * rays[j, 2]
-            mt = rays[i, 0] * rays[j, 1] - rays[i, 1] * rays[j, 0]
+            a, b = rays[i], rays[j]
+            mx, my, mt = a.y * b.t - a.t * b.y, a.t * b.x - a.x * b.t, a.x * b.y - a.y * b.x
             length = math.sqrt(mx * mx + my * my + mt * mt)
             if length < 1e-12:
                 continue
@@ -133,7 +141,7 @@ def _holds(kind: int, table: Array, vx: float, vy: float, w: float, rays: Array,
             ahead = behind = 0
             for k in range(count):
                 if k != i and k != j:
-                    side = mx * rays[k, 0] + my * rays[k, 1] + mt * rays[k, 2]
+                    side = mx * rays[k].x + my * rays[k].y + mt * rays[k].t
                     if side > 1e-12:
                         ahead += 1
                     elif side < -1e-12:
@@ -144,27 +152,25 @@ def _holds(kind: int, table: Array, vx: float, vy: float, w: float, rays: Array,
             for sign in (1.0, -1.0):
                 if (sign > 0 and behind > 0) or (sign < 0 and ahead > 0):
                     continue
-                if foot == 0:
+                if not at_foot:
                     if sign * power < -_CLOSED:
                         return False
                 else:
-                    planes[found, 0] = sign * (mx - mt * table[foot, 1])
-                    planes[found, 1] = sign * (my + mt * table[foot, 0])
-                    planes[found, 2] = -sign * power
+                    plane = planes[found]
+                    plane.x, plane.y = sign * (mx - mt * wrench.y), sign * (my + mt * wrench.x)
+                    plane.t = -sign * power
                     found += 1
-    if foot == 0 or found == 0:
-        return True
-    return _reach(planes, found) <= table[foot, 2] + _CLOSED
+    return found == 0 or _reach(planes, found) <= wrench.free + _CLOSED
 
 
-@part
-def _reach(planes: Array, count: int) -> Any:
-    """The size of the least g in the plane with a·g ≥ b for all rows (a, b); inf if there is none."""
+@formula
+def _reach(planes: Rows, count: int) -> float:
+    """The size of the least g in the plane with (x, y)·g ≥ t for all rows; inf if there is none."""
     if _within(planes, count, 0.0, 0.0):
         return 0.0
     best = np.inf
     for i in range(count):
-        ax, ay, b = planes[i, 0], planes[i, 1], planes[i, 2]
+        ax, ay, b = planes[i].x, planes[i].y, planes[i].t
         square = ax * ax + ay * ay
         if square < 1e-24:
             continue
@@ -172,7 +178,7 @@ def _reach(planes: Array, count: int) -> Any:
         if _within(planes, count, gx, gy):
             best = min(best, math.sqrt(gx * gx + gy * gy))
         for j in range(i):
-            cx, cy, d = planes[j, 0], planes[j, 1], planes[j, 2]
+            cx, cy, d = planes[j].x, planes[j].y, planes[j].t
             det = ax * cy - ay * cx
             if abs(det) > 1e-12:
                 gx, gy = (b * cy - ay * d) / det, (ax * d - b * cx) / det
@@ -181,59 +187,49 @@ def _reach(planes: Array, count: int) -> Any:
     return best
 
 
-@part
-def _within(planes: Array, count: int, gx: float, gy: float) -> Any:
+@formula
+def _within(planes: Rows, count: int, gx: float, gy: float) -> Any:
     least = 0.0
     for i in range(count):
-        least = min(least, planes[i, 0] * gx + planes[i, 1] * gy - planes[i, 2])
+        least = min(least, planes[i].x * gx + planes[i].y * gy - planes[i].t)
     return least >= -_CLOSED
 
 
-@part
+@formula
 def _side_force(
-    kind: int, table: Array, vx: float, vy: float, w: float, zx: float, zy: float, zt: float
-) -> Any:
+    surface: SurfaceArrays, vx: float, vy: float, w: float, zx: float, zy: float, zt: float
+) -> float:
     """How far a wrench of a twist lies off the plane z of two sliding forces; of a free foot the nearest."""
-    fx, fy, t, foot = wrench_of(kind, table, vx, vy, w)
-    off = zx * fx + zy * fy + zt * t
-    if foot > 0:
-        free = table[foot, 2] * math.hypot(zx - zt * table[foot, 1], zy + zt * table[foot, 0])
+    wrench = wrench_of(surface, vx, vy, w)
+    off = zx * wrench.fx + zy * wrench.fy + zt * wrench.t
+    if wrench.free > 0.0:
+        free = wrench.free * math.hypot(zx - zt * wrench.y, zy + zt * wrench.x)
         if abs(off) <= free:
             return 0.0
         off -= free if off > 0 else -free
     return off
 
 
-@part
+@formula
 def _both_push(
-    kind: int,
-    table: Array,
-    vx: float,
-    vy: float,
-    w: float,
-    c: Array,
-    left0: bool,
-    left1: bool,
-    mu: float,
-    tight: float,
-) -> Any:
-    """Whether a wrench of a twist is made by both sliding forces, none of them negative."""
-    fx, fy, t, foot = wrench_of(kind, table, vx, vy, w)
-    s0, s1 = (mu if left0 else -mu), (mu if left1 else -mu)
-    ax, ay = c[0, 2] - s0 * c[0, 3], c[0, 3] + s0 * c[0, 2]
-    bx, by = c[1, 2] - s1 * c[1, 3], c[1, 3] + s1 * c[1, 2]
-    at, bt = c[0, 0] * ay - c[0, 1] * ax, c[1, 0] * by - c[1, 1] * bx
+    surface: SurfaceArrays, vx: float, vy: float, w: float, c: Rows, s0: float, s1: float, tight: float
+) -> bool:
+    """Whether a wrench of a twist is made by the forces with tangential shares s0 and s1, none of them negative."""
+    wrench = wrench_of(surface, vx, vy, w)
+    fx, fy, t = wrench.fx, wrench.fy, wrench.t
+    ax, ay, at = _edge_wrench(c[0], s0)
+    bx, by, bt = _edge_wrench(c[1], s1)
     zx, zy, zt = ay * bt - at * by, at * bx - ax * bt, ax * by - ay * bx
-    if foot > 0:
+    if wrench.free > 0.0:
         # The free force that reaches the plane of both, square to it as seen from the foot.
-        qx, qy = zx - zt * table[foot, 1], zy + zt * table[foot, 0]
+        qx, qy = zx - zt * wrench.y, zy + zt * wrench.x
         square = qx * qx + qy * qy
         if square > 0:
             k = -(zx * fx + zy * fy + zt * t) / square
             size = abs(k) * math.sqrt(square)
-            if size > table[foot, 2]:
-                k *= table[foot, 2] / size
-            fx, fy, t = fx + k * qx, fy + k * qy, t + k * (table[foot, 0] * qy - table[foot, 1] * qx)
+            if size > wrench.free:
+                k *= wrench.free / size
+            fx, fy, t = fx + k * qx, fy + k * qy, t + k * (wrench.x * qy - wrench.y * qx)
     size = math.sqrt(fx * fx + fy * fy + t * t)
     aa, bb = ax * ax + ay * ay + at * at, bx * bx + by * by + bt * bt
     ab = ax * bx + ay * by + at * bt
@@ -248,23 +244,23 @@ def _both_push(
     return math.sqrt(ex * ex + ey * ey + et * et) <= tight * size
 
 
-@part
-def _slip(c: Array, i: int, vx: float, vy: float, w: float) -> Any:
-    """Tangential velocity of the finger less the object's at contact i, + to the left."""
-    rx, ry = c[i, 4] - vx + w * c[i, 1], c[i, 5] - vy - w * c[i, 0]
-    return c[i, 2] * ry - c[i, 3] * rx
+@formula
+def _slip(at: Row, vx: float, vy: float, w: float) -> Any:
+    """Tangential velocity of the finger less the object's at a contact, + to the left."""
+    rx, ry = at.ux - vx + w * at.y, at.uy - vy - w * at.x
+    return at.nx * ry - at.ny * rx
 
 
-@part
-def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> Any:
+@formula
+def _both_slide(surface: SurfaceArrays, c: Rows, mu: float, speed: float) -> Any:
     """Both contacts slide: ok and the twist, among those that keep both normal velocities, V₀ + ω k.
 
     Between the two ω at which a slip vanishes, and beyond them, the sides on which both slide are known; what is sought
     is a zero of the wrench's distance from the plane of the two forces.
     """
-    ax, ay, at = c[0, 2], c[0, 3], c[0, 0] * c[0, 3] - c[0, 1] * c[0, 2]
-    bx, by, bt = c[1, 2], c[1, 3], c[1, 0] * c[1, 3] - c[1, 1] * c[1, 2]
-    a, b = ax * c[0, 4] + ay * c[0, 5], bx * c[1, 4] + by * c[1, 5]
+    ax, ay, at = _edge_wrench(c[0], 0.0)
+    bx, by, bt = _edge_wrench(c[1], 0.0)
+    a, b = ax * c[0].ux + ay * c[0].uy, bx * c[1].ux + by * c[1].uy
     kx, ky, kt = ay * bt - at * by, at * bx - ax * bt, ax * by - ay * bx
     length = math.sqrt(kx * kx + ky * ky + kt * kt)
     aa, bb, ab = ax * ax + ay * ay + at * at, bx * bx + by * by + bt * bt, ax * bx + ay * by + at * bt
@@ -275,8 +271,8 @@ def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> A
     p, q = (bb * a - ab * b) / det, (aa * b - ab * a) / det
     ox, oy, ot = p * ax + q * bx, p * ay + q * by, p * at + q * bt
     # The slips are linear in ω: where each vanishes.
-    s0, s1 = _slip(c, 0, ox, oy, ot), _slip(c, 1, ox, oy, ot)
-    d0, d1 = _slip(c, 0, ox + kx, oy + ky, ot + kt) - s0, _slip(c, 1, ox + kx, oy + ky, ot + kt) - s1
+    s0, s1 = _slip(c[0], ox, oy, ot), _slip(c[1], ox, oy, ot)
+    d0, d1 = _slip(c[0], ox + kx, oy + ky, ot + kt) - s0, _slip(c[1], ox + kx, oy + ky, ot + kt) - s1
     w0 = -s0 / d0 if abs(d0) > 1e-12 else np.inf
     w1 = -s1 / d1 if abs(d1) > 1e-12 else np.inf
     lowest, highest = min(w0, w1), max(w0, w1)
@@ -299,16 +295,15 @@ def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> A
             left0 = s0 + middle * d0 > 0
             left1 = s1 + middle * d1 > 0
             t0, t1 = (mu if left0 else -mu), (mu if left1 else -mu)
-            gx, gy = ax - t0 * ay, ay + t0 * ax
-            hx, hy = bx - t1 * by, by + t1 * bx
-            gt, ht = c[0, 0] * gy - c[0, 1] * gx, c[1, 0] * hy - c[1, 1] * hx
+            gx, gy, gt = _edge_wrench(c[0], t0)
+            hx, hy, ht = _edge_wrench(c[1], t1)
             zx, zy, zt = gy * ht - gt * hy, gt * hx - gx * ht, gx * hy - gy * hx
             size = math.sqrt(zx * zx + zy * zy + zt * zt)
             if size < 1e-12:
                 continue
             zx, zy, zt = zx / size, zy / size, zt / size
             start = low
-            value = _side_force(kind, table, ox + low * kx, oy + low * ky, ot + low * kt, zx, zy, zt)
+            value = _side_force(surface, ox + low * kx, oy + low * ky, ot + low * kt, zx, zy, zt)
             for piece in range(1, pieces + 1):
                 share = piece / pieces
                 if span == 0:
@@ -317,7 +312,7 @@ def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> A
                     end = low + far * share**12 if pieces > 1 else high
                 else:
                     end = high - far * (1 - share) ** 12 if pieces > 1 else high
-                after = _side_force(kind, table, ox + end * kx, oy + end * ky, ot + end * kt, zx, zy, zt)
+                after = _side_force(surface, ox + end * kx, oy + end * ky, ot + end * kt, zx, zy, zt)
                 if value * after <= 0.0 and (value != 0.0 or after != 0.0 or pieces == 1):
                     x0, x1, f0, f1 = start, end, value, after
                     side = 0
@@ -336,7 +331,7 @@ def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> A
                             else:
                                 root = (x0 * f1 - x1 * f0) / (f1 - f0)
                             f = _side_force(
-                                kind, table, ox + root * kx, oy + root * ky, ot + root * kt, zx, zy, zt
+                                surface, ox + root * kx, oy + root * ky, ot + root * kt, zx, zy, zt
                             )
                             if f == 0.0 or x1 - x0 <= 1e-15 * (abs(x0) + abs(x1) + 1e-3 * speed):
                                 break
@@ -349,78 +344,77 @@ def _both_slide(kind: int, table: Array, c: Array, mu: float, speed: float) -> A
                                 f0 = 0.5 * f0 if side == -1 and step % 3 != 2 else f0
                                 side = -1
                     vx, vy, w = ox + root * kx, oy + root * ky, ot + root * kt
-                    if _both_push(kind, table, vx, vy, w, c, left0, left1, mu, 1e-6):
+                    if _both_push(surface, vx, vy, w, c, t0, t1, _LOOSE):
                         return True, vx, vy, w
                 start, value = end, after
     return False, 0.0, 0.0, 0.0
 
 
-@part
-def two(kind: int, table: Array, c: Array, mu: float, rays: Array) -> Any:
+@formula
+def two(surface: SurfaceArrays, mu: float, scratch: Scratch) -> Any:
     """Two contacts at once: status, both modes and the twist.
 
     Of several answers, which friction allows now and then, the first of: both stick, one sticks and the other slides,
     both slide, one touches alone (sticking before sliding), none.
 
-    Args:
-        c: rows of point, normal and the finger's velocity there, shape (2, 6).
-        rays: scratch of shape (16, 3).
+    The contacts are the scratch's first two, their points in ℓ.
     """
-    speed = max(math.hypot(c[0, 4], c[0, 5]), math.hypot(c[1, 4], c[1, 5]))
+    c, rays = scratch.contacts, scratch.rays
+    speed = max(math.hypot(c[0].ux, c[0].uy), math.hypot(c[1].ux, c[1].uy))
     if speed == 0.0:
         return GOING, REST, REST, 0.0, 0.0, 0.0
     tiny = 1e-12 * speed
-    a, b = c[0, 2] * c[0, 4] + c[0, 3] * c[0, 5], c[1, 2] * c[1, 4] + c[1, 3] * c[1, 5]
+    a, b = c[0].nx * c[0].ux + c[0].ny * c[0].uy, c[1].nx * c[1].ux + c[1].ny * c[1].uy
     if a < -tiny and b < -tiny:
         return GOING, SEPARATION, SEPARATION, 0.0, 0.0, 0.0
-    px, py, qx, qy = c[0, 0], c[0, 1], c[1, 0], c[1, 1]
+    px, py, qx, qy = c[0].x, c[0].y, c[1].x, c[1].y
     dx, dy = qx - px, qy - py
     gap = math.sqrt(dx * dx + dy * dy)
     if mu > 0.0 and gap > 1e-9:
-        ex, ey = c[1, 4] - c[0, 4], c[1, 5] - c[0, 5]
+        ex, ey = c[1].ux - c[0].ux, c[1].uy - c[0].uy
         # Both stick, if the fingers move as points of one body.
         if abs(ex * dx + ey * dy) <= 1e-9 * gap * speed:
             w = (dx * ey - dy * ex) / (gap * gap)
-            vx, vy = c[0, 4] + w * py, c[0, 5] - w * px
+            vx, vy = c[0].ux + w * py, c[0].uy - w * px
             if abs(vx) + abs(vy) + abs(w) > tiny:
                 for i in range(2):
-                    _ray(rays, 2 * i, c[i, 0], c[i, 1], c[i, 2], c[i, 3], mu)
-                    _ray(rays, 2 * i + 1, c[i, 0], c[i, 1], c[i, 2], c[i, 3], -mu)
-                if _holds(kind, table, vx, vy, w, rays, 4):
+                    _set_ray(rays[2 * i], c[i], mu)
+                    _set_ray(rays[2 * i + 1], c[i], -mu)
+                if _holds(surface, vx, vy, w, scratch, 4):
                     return GOING, STICKING, STICKING, vx, vy, w
         # One sticks, the other slides.
         for i in range(2):
             j = 1 - i
             side = 1.0 if i == 0 else -1.0
-            turn = side * (c[j, 3] * dx - c[j, 2] * dy)
+            turn = side * (c[j].ny * dx - c[j].nx * dy)
             if abs(turn) > 1e-12:
-                w = side * (c[j, 2] * ex + c[j, 3] * ey) / turn
-                vx, vy = c[i, 4] + w * c[i, 1], c[i, 5] - w * c[i, 0]
+                w = side * (c[j].nx * ex + c[j].ny * ey) / turn
+                vx, vy = c[i].ux + w * c[i].y, c[i].uy - w * c[i].x
                 if abs(vx) + abs(vy) + abs(w) > tiny:
-                    left = _slip(c, j, vx, vy, w) > 0
-                    _ray(rays, 0, c[i, 0], c[i, 1], c[i, 2], c[i, 3], mu)
-                    _ray(rays, 1, c[i, 0], c[i, 1], c[i, 2], c[i, 3], -mu)
-                    _ray(rays, 2, c[j, 0], c[j, 1], c[j, 2], c[j, 3], mu if left else -mu)
-                    if _holds(kind, table, vx, vy, w, rays, 3):
+                    left = _slip(c[j], vx, vy, w) > 0
+                    _set_ray(rays[0], c[i], mu)
+                    _set_ray(rays[1], c[i], -mu)
+                    _set_ray(rays[2], c[j], mu if left else -mu)
+                    if _holds(surface, vx, vy, w, scratch, 3):
                         other = LEFT if left else RIGHT
                         if i == 0:
                             return GOING, STICKING, other, vx, vy, w
                         return GOING, other, STICKING, vx, vy, w
-    ok, vx, vy, w = _both_slide(kind, table, c, mu, speed)
+    ok, vx, vy, w = _both_slide(surface, c, mu, speed)
     if ok:
-        m0 = LEFT if _slip(c, 0, vx, vy, w) > 0 else RIGHT
-        m1 = LEFT if _slip(c, 1, vx, vy, w) > 0 else RIGHT
+        m0 = LEFT if _slip(c[0], vx, vy, w) > 0 else RIGHT
+        m1 = LEFT if _slip(c[1], vx, vy, w) > 0 else RIGHT
         return GOING, m0, m1, vx, vy, w
     # One alone: the object must not move into the other finger.
     best, found = -1, REST
     sx = sy = sw = 0.0
     for i in range(2):
         j = 1 - i
-        mode, vx, vy, w, _ = one(kind, table, c[i, 0], c[i, 1], c[i, 2], c[i, 3], c[i, 4], c[i, 5], mu)
+        mode, vx, vy, w, _ = one(surface, c[i].x, c[i].y, c[i].nx, c[i].ny, c[i].ux, c[i].uy, mu)
         if mode == SEPARATION or (vx == 0.0 and vy == 0.0 and w == 0.0):
             continue
-        moves = c[j, 2] * (vx - w * c[j, 1]) + c[j, 3] * (vy + w * c[j, 0])
-        if moves >= c[j, 2] * c[j, 4] + c[j, 3] * c[j, 5] - 1e-9 * speed and (best < 0 or found != STICKING):
+        moves = c[j].nx * (vx - w * c[j].y) + c[j].ny * (vy + w * c[j].x)
+        if moves >= c[j].nx * c[j].ux + c[j].ny * c[j].uy - 1e-9 * speed and (best < 0 or found != STICKING):
             best, found, sx, sy, sw = i, mode, vx, vy, w
     if best >= 0:
         other = SEPARATION
@@ -428,14 +422,14 @@ def two(kind: int, table: Array, c: Array, mu: float, rays: Array) -> Any:
             return GOING, found, other, sx, sy, sw
         return GOING, other, found, sx, sy, sw
     if a <= 1e-9 * speed and b <= 1e-9 * speed:
-        m0 = SEPARATION if a < -tiny else (LEFT if _slip(c, 0, 0.0, 0.0, 0.0) > 0 else RIGHT)
-        m1 = SEPARATION if b < -tiny else (LEFT if _slip(c, 1, 0.0, 0.0, 0.0) > 0 else RIGHT)
+        m0 = SEPARATION if a < -tiny else (LEFT if _slip(c[0], 0.0, 0.0, 0.0) > 0 else RIGHT)
+        m1 = SEPARATION if b < -tiny else (LEFT if _slip(c[1], 0.0, 0.0, 0.0) > 0 else RIGHT)
         return GOING, m0, m1, 0.0, 0.0, 0.0
     # Nothing agrees with both. It must be that they hold the object between them, along the line that joins them.
     status = UNDECIDED
     if gap > 1e-9:
-        along = (c[0, 2] * dx + c[0, 3] * dy) / gap
-        against = -(c[1, 2] * dx + c[1, 3] * dy) / gap
+        along = (c[0].nx * dx + c[0].ny * dy) / gap
+        against = -(c[1].nx * dx + c[1].ny * dy) / gap
         least = (1 - 1e-6) / math.sqrt(1 + mu * mu)
         if along >= least and against >= least:
             status = JAMMED

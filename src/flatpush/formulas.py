@@ -1,0 +1,29 @@
+"""Formulas that have one source: Python runs them as they stand, and kernels compile them.
+
+Nothing here needs a compiler; flatpush.compiled hands it what is collected here before it compiles a kernel.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+FORMULAS: list[Callable[..., object]] = []
+CHOICES: list[tuple[Callable[..., object], Mapping[type, Callable[..., object]]]] = []
+
+
+def formula(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorates a function of numbers, NamedTuples and rows with named columns that kernels may call."""
+    FORMULAS.append(function)
+    return function
+
+
+def by_type(ways: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
+    """The function that goes the way of its first argument's class, a NamedTuple; a kernel compiles only that way."""
+
+    def chosen(first: object, *others: object) -> object:
+        return ways[type(first)](first, *others)
+
+    CHOICES.append((chosen, ways))
+    return chosen

@@ -1,0 +1,319 @@
+"""Limit surfaces, outlines and poses as data with names, for the plant's steps.
+
+Every class comes in three kinds with the same names: of one run, with plain numbers and sequences of rows, which Python
+reads quickly; of one run in a kernel, with numbers and record arrays; and of many runs, with an array of one number for
+each run, and the rows of all runs one after the other.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...errors import FlatpushError
+from ...friction import Ellipsoid, Exact, LimitSurface, Quartic
+from ...friction.pressure import Edges, Feet, Round
+from ...geometry import Outline
+from ...geometry.pose import Array
+
+SeenRows = Any  # an array of SEEN rows; numpy's types do not know columns by name
+Rows = Any  # a sequence of rows with named columns, or a record array
+
+
+class Row:
+    """A row that Python writes to, with the columns of a record."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.__dict__.update(dict.fromkeys(names, 0.0))
+
+    if TYPE_CHECKING:  # its columns
+
+        def __getattr__(self, name: str) -> Any: ...
+        def __setattr__(self, name: str, value: float) -> None: ...
+
+
+def _record(numbers: str, codes: str = "") -> np.dtype:
+    return np.dtype([(name, "f8") for name in numbers.split()] + [(name, "i8") for name in codes.split()])
+
+
+POINT = _record("x y")
+POSE = _record("x y angle")  # X_WO or X_WE, or a displacement
+SEEN = _record(
+    "x y gap", "mode modes"
+)  # the nearest point in O, its gap, last mode, all modes as bits 1 << mode
+CONTACT = _record(
+    "x y nx ny ux uy gap", "finger feature"
+)  # about the COF in O: point, normal, the finger's velocity
+RAY = _record("x y t")
+EDGE = _record(
+    "x y ex ey length nx ny convex"
+)  # start, direction, inward normal, whether the start's corner is convex
+FOOT = _record(
+    "x y weight power fx fy t"
+)  # of the rotation about the foot: dissipation, wrench of the others
+SIDE = _record(
+    "ex ey first last distance"
+)  # a straight piece of a support: direction, ends along it, distance
+ELLIPSE = _record("xx xy xt yy yt tt ixx ixy ixt iyy iyt itt")  # the symmetric matrix A, and its inverse
+TERMS = _record("xxxx yyyy zzzz xxxy xxxz yyyx yyyz zzzx zzzy xxyy xxzz yyzz xxyz yyxz zzxy")
+
+
+class EllipsoidArrays(NamedTuple):
+    """unit: of length ℓ [m]. ellipse: one ELLIPSE row; A in ℓ, of trace 3."""
+
+    unit: Any
+    ellipse: Rows
+
+
+class QuarticArrays(NamedTuple):
+    """unit: of length ℓ [m]. terms: one TERMS row; coefficients by their monomials, balanced."""
+
+    unit: Any
+    terms: Rows
+
+
+class FeetArrays(NamedTuple):
+    """unit: of length ℓ [m]. radius: of the support [ℓ]. feet: FOOT rows, about the COF, lengths in ℓ."""
+
+    unit: Any
+    radius: Any
+    feet: Rows
+
+
+class SidesArrays(NamedTuple):
+    """A uniform pressure on a polygon's outline, or inside it.
+
+    unit: of length ℓ [m]. radius: of the support [ℓ]. size: its length or area [ℓ, ℓ²]. filled: whether inside.
+    x, y: the origin of its own coordinates, seen from the COF [ℓ]. sides: SIDE rows about the COF.
+    nodes: FOOT rows that stand for it from far away.
+    """
+
+    unit: Any
+    radius: Any
+    filled: Any
+    size: Any
+    x: Any
+    y: Any
+    sides: Rows
+    nodes: Rows
+
+
+class RoundArrays(NamedTuple):
+    """A uniform pressure on a circle, or inside it: as SidesArrays."""
+
+    unit: Any
+    radius: Any
+    filled: Any
+    x: Any
+    y: Any
+    nodes: Rows
+
+
+SurfaceArrays = EllipsoidArrays | QuarticArrays | FeetArrays | SidesArrays | RoundArrays
+
+
+class OutlineArrays(NamedTuple):
+    """A polygon's EDGE rows, counter-clockwise, or a circle. All in O, in metres.
+
+    circle: whether it is one, with centre x, y and radius. convex: whether all corners are. size: of the outline.
+    """
+
+    circle: bool
+    x: float
+    y: float
+    radius: float
+    convex: bool
+    size: float
+    edges: Rows
+
+
+class Setting(NamedTuple):
+    """What a run does not change. cof_x, cof_y: in O. radius: of the fingertips. fingers: POINT rows in E."""
+
+    surface: Any
+    cof_x: float
+    cof_y: float
+    outline: OutlineArrays
+    friction: float
+    radius: float
+    fingers: Rows
+
+
+class ManySettings(NamedTuple):
+    """The settings of many runs: surfaces of many runs, POINT rows `cofs` and `frictions`, one for all or one each."""
+
+    surfaces: Any
+    cofs: Rows
+    outline: OutlineArrays
+    frictions: Array
+    radius: float
+    fingers: Rows
+
+
+class Course(NamedTuple):
+    """The way of the hands: how many, poses of each, how they go from one to the next (codes.STRAIGHT and others).
+
+    rows: poses of the object that are kept of each run, 1 or all. push_out: whether it is moved out of the fingers.
+    """
+
+    hands: int
+    number: int
+    kind: int
+    rows: int
+    push_out: bool
+
+
+class Move(NamedTuple):
+    """A step of the hands.
+
+    hands: POSE rows, one or one for each finger. steps: their displacements. kind: codes.BODY, or straight.
+    """
+
+    hands: Rows
+    steps: Rows
+    kind: int
+
+
+class Scratch(NamedTuple):
+    """What a step writes to. contacts: 4 CONTACT rows. rays, planes: RAY rows, 4 and 12. q: one POSE row.
+    hands, steps: a POSE row for each finger. now: a SEEN row for each finger."""
+
+    contacts: Rows
+    rays: Rows
+    planes: Rows
+    q: Rows
+    hands: Rows
+    steps: Rows
+    now: Rows
+
+
+_COUNTS = {"contacts": (CONTACT, 4), "rays": (RAY, 4), "planes": (RAY, 12), "q": (POSE, 1)}
+
+
+def scratch(fingers: int, interpreted: bool) -> Scratch:
+    """Room for the steps of some fingers."""
+    rooms = _COUNTS | {"hands": (POSE, fingers), "steps": (POSE, fingers), "now": (SEEN, fingers)}
+    if interpreted:
+        return Scratch(**{name: blank(dtype, count) for name, (dtype, count) in rooms.items()})
+    return Scratch(**{name: np.zeros(count, dtype) for name, (dtype, count) in rooms.items()})
+
+
+def blank(dtype: np.dtype, count: int) -> list[Row]:
+    """Rows that Python writes to."""
+    return [Row(dtype.names or ()) for _ in range(count)]
+
+
+def plain_rows(rows: Array) -> list[Any]:
+    """A record array as NamedTuples of Python's numbers."""
+    Plain = _PLAIN.setdefault(
+        rows.dtype, NamedTuple("Plain", [(name, float) for name in rows.dtype.names or ()])
+    )
+    return [Plain(*row) for row in rows.tolist()]
+
+
+_PLAIN: dict[np.dtype, Any] = {}
+
+
+def interpreted(arrays: Any) -> Any:
+    """The same NamedTuple with rows that Python reads quickly, also of what it holds."""
+    values = []
+    for value in arrays:
+        if isinstance(value, tuple):
+            value = interpreted(value)
+        elif isinstance(value, np.ndarray):
+            value = plain_rows(value)
+        values.append(value)
+    return type(arrays)(*values)
+
+
+def of_many(surfaces: Sequence[SurfaceArrays]) -> SurfaceArrays | None:
+    """Surfaces of one kind and size as one of many runs; None if they are not."""
+    first = surfaces[0]
+    if any(type(s) is not type(first) for s in surfaces):
+        return None
+    columns = []
+    for values in zip(*surfaces, strict=True):
+        if not isinstance(values[0], np.ndarray):
+            columns.append(np.array(values))
+        elif len({len(v) for v in values}) == 1:
+            columns.append(np.concatenate(values))
+        else:
+            return None
+    return type(first)(*columns)
+
+
+def compilable(surface: LimitSurface) -> bool:
+    """Whether the steps know the surface: all but collinear feet and surfaces of a user's own."""
+    return isinstance(surface, Ellipsoid | Quartic) or (
+        isinstance(surface, Exact) and not surface.support.collinear
+    )
+
+
+def surface_arrays(surface: LimitSurface) -> SurfaceArrays:
+    """A limit surface about the centre of friction. Its lengths are in its unit ℓ.
+
+    Raises:
+        FlatpushError: if the steps do not know the surface (see compilable).
+    """
+    if isinstance(surface, Ellipsoid):
+        A = surface.matrix
+        ell = float(np.sqrt(np.trace(A[:2, :2]) / 2 / A[2, 2]))
+        units = np.array([1.0, 1.0, ell])
+        A = A * np.outer(units, units)
+        A = A / (np.trace(A) / 3)
+        upper = np.triu_indices(3)
+        return EllipsoidArrays(ell, records(ELLIPSE, [[*A[upper], *np.linalg.inv(A)[upper]]]))
+    if isinstance(surface, Quartic):
+        units = surface._units
+        x, y, z = units[0], units[1], units[2]
+        names = TERMS.names or ()
+        scale = [x ** m.count("x") * y ** m.count("y") * z ** m.count("z") for m in names]
+        return QuarticArrays(float(z / x), records(TERMS, [surface.coefficients * scale]))
+    if not isinstance(surface, Exact) or surface.support.collinear:
+        raise FlatpushError("the compiled simulation does not know this limit surface")
+    support = surface.support
+    ell = float(np.sqrt(np.trace(support.covariance)))
+    pressure, centre = support.pressure.scaled(1 / ell), support.centre / ell
+    if isinstance(pressure, Feet):
+        points, weights = pressure.points, pressure.weights
+        turns = np.stack([points[:, 1], -points[:, 0], np.ones(len(points))], axis=1)
+        h, W, _ = Feet(points, weights).resist(turns)  # the foot itself rests
+        W[:, 2] += centre[0] * W[:, 1] - centre[1] * W[:, 0]
+        feet = records(FOOT, np.column_stack([points + centre, weights, h, W]))
+        return FeetArrays(ell, float(pressure.radius), feet)
+    points, weights = pressure.nodes
+    far = records(FOOT, np.column_stack([points + centre, weights, np.zeros((len(points), 4))]))
+    x, y, radius = float(centre[0]), float(centre[1]), float(pressure.radius)
+    if isinstance(pressure, Round):
+        return RoundArrays(ell, radius, bool(pressure.filled), x, y, far)
+    assert isinstance(pressure, Edges)
+    start, e, length = _sides(pressure.vertices)
+    t0, d = np.sum(start * e, axis=1), start[:, 0] * e[:, 1] - start[:, 1] * e[:, 0]
+    size = float(np.sum(d * length) / 2 if pressure.filled else np.sum(length))
+    shift, across = e @ centre, e[:, 1] * centre[0] - e[:, 0] * centre[1]
+    sides = records(SIDE, np.column_stack([e, t0 + shift, t0 + length + shift, d + across]))
+    return SidesArrays(ell, radius, bool(pressure.filled), size, x, y, sides, far)
+
+
+def outline_arrays(outline: Outline) -> OutlineArrays:
+    """An outline for the steps."""
+    size = float(outline.size)
+    if outline.is_circle:
+        x, y = (float(v) for v in outline.centre)
+        return OutlineArrays(True, x, y, float(outline.radius), True, size, np.zeros(0, EDGE))
+    start, e, length = _sides(outline.vertices if outline.sense > 0 else outline.vertices[::-1])
+    before = np.roll(e, 1, axis=0)
+    convex = before[:, 0] * e[:, 1] - before[:, 1] * e[:, 0] >= 0
+    edges = records(EDGE, np.column_stack([start, e, length, -e[:, 1], e[:, 0], convex]))
+    return OutlineArrays(False, 0.0, 0.0, 0.0, bool(convex.all()), size, edges)
+
+
+def _sides(start: Array) -> tuple[Array, Array, Array]:
+    step = np.roll(start, -1, axis=0) - start
+    length = np.hypot(step[:, 0], step[:, 1])
+    return start, step / length[:, None], length
+
+
+def records(dtype: np.dtype, rows: Any) -> Array:
+    """Rows of numbers as a record array of numbers only."""
+    return np.array(rows, dtype=float, order="C").view(dtype).reshape(-1)

@@ -1,0 +1,547 @@
+"""Fingers against an object over a stretch of their motion: at most two contacts at a time.
+
+Python runs these formulas as they stand, and simulation.plant.kernels compiles them. A step is a fourth-order
+Runge-Kutta-Munthe-Kaas step (exact where the twist is constant, [Munthe-Kaas1998]); where contact modes or the touched
+features change on the way it is halved down to a thirty-second, and where a finger touches it ends. The plain version,
+for any number of contacts and any surface, is simulation.plant.plain.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...formulas import formula
+from .arrays import Move, OutlineArrays, Row, Rows, Scratch, Setting
+from .codes import (
+    AS_IT_IS,
+    BODY,
+    GOING,
+    GRASPED,
+    INSIDE,
+    JAMMED,
+    MANY,
+    REST,
+    SEPARATION,
+    STICKING,
+    UNDECIDED,
+)
+from .contact_modes import one, two
+
+STEP = 1 / 60  # longest travel of the fingers in one step, by the outline's size
+TOUCH = 2e-8  # a gap up to this, by the outline's size, touches
+OVERLAP = 1e-5  # a deeper overlap at the start, by the outline's size, is inside
+CORNER_STEP = 0.25  # of the tip's radius: longest travel in a step round a corner,
+SHARP_STEP = 2e-4  # or this by the outline's size, for a sharp tip
+LEVER = 0.3  # of the outline's size: the length by which a turn is weighed against a shift where contacts are restored
+LOOKS = 8  # places on a step at which fingers that do not touch are watched
+HALVINGS = 5
+SETTLES = 4  # times that a step is shortened to where something touches
+MOST_STEPS = 1_000_000  # of one motion between two poses
+ALL_THAT_TOUCH = -1  # a mask of contacts
+
+
+class Place(NamedTuple):
+    """Where an outline faces a point: signed distance, point in O, inward normal, and the feature.
+
+    Features: 2k an edge, 2k + 1 the corner at its start; of a circle 0; -1 where nothing faces it.
+    """
+
+    distance: float
+    x: float
+    y: float
+    nx: float
+    ny: float
+    feature: int
+
+
+@formula
+def nearest(outline: OutlineArrays, x: float, y: float) -> Place:
+    """The nearest place of the outline to a point in O."""
+    if outline.circle:
+        dx, dy = x - outline.x, y - outline.y
+        d = math.sqrt(dx * dx + dy * dy)
+        ux, uy = (dx / d, dy / d) if d > 0 else (1.0, 0.0)
+        R = outline.radius
+        return Place(d - R, outline.x + R * ux, outline.y + R * uy, -ux, -uy, 0)
+    best, found, corner = np.inf, 0, False
+    for i in range(len(outline.edges)):
+        edge = outline.edges[i]
+        dx, dy = x - edge.x, y - edge.y
+        s = dx * edge.ex + dy * edge.ey
+        if s < 0:
+            square = dx * dx + dy * dy
+            if square < best:
+                best, found, corner = square, i, True
+        elif s <= edge.length:
+            d = dx * edge.nx + dy * edge.ny
+            if d * d < best:
+                best, found, corner = d * d, i, False
+    edge = outline.edges[found]
+    dx, dy = x - edge.x, y - edge.y
+    nx, ny = edge.nx, edge.ny
+    if not corner:
+        s = dx * edge.ex + dy * edge.ey
+        return Place(-(dx * nx + dy * ny), edge.x + s * edge.ex, edge.y + s * edge.ey, nx, ny, 2 * found)
+    d = math.sqrt(best)
+    sign = 1.0 if edge.convex > 0.5 else -1.0
+    if d > 1e-12 * outline.size:
+        nx, ny = -sign * dx / d, -sign * dy / d
+    return Place(sign * d, edge.x, edge.y, nx, ny, 2 * found + 1)
+
+
+@formula
+def second(outline: OutlineArrays, x: float, y: float, taken: int) -> Place:
+    """As nearest, for another edge or corner that faces the point; distance inf if there is none.
+
+    Only an outline that is not convex can meet a round finger twice.
+    """
+    if outline.convex:
+        return Place(np.inf, 0.0, 0.0, 0.0, 0.0, -1)
+    best, found, corner = np.inf, -1, False
+    count = len(outline.edges)
+    least = -OVERLAP * outline.size
+    for i in range(count):
+        edge = outline.edges[i]
+        dx, dy = x - edge.x, y - edge.y
+        s = dx * edge.ex + dy * edge.ey
+        if s < 0:
+            if 2 * i + 1 == taken or edge.convex < 0.5:
+                continue
+            before = outline.edges[i - 1 if i > 0 else count - 1]
+            d = math.sqrt(dx * dx + dy * dy)
+            if (x - before.x) * before.ex + (y - before.y) * before.ey > before.length and d < best:
+                best, found, corner = d, i, True
+        elif s <= edge.length and 2 * i != taken:
+            d = -(dx * edge.nx + dy * edge.ny)
+            if least < d < best:
+                best, found, corner = d, i, False
+    if found < 0:
+        return Place(np.inf, 0.0, 0.0, 0.0, 0.0, -1)
+    edge = outline.edges[found]
+    dx, dy = x - edge.x, y - edge.y
+    if corner:
+        return Place(best, edge.x, edge.y, -dx / best, -dy / best, 2 * found + 1)
+    s = dx * edge.ex + dy * edge.ey
+    return Place(best, edge.x + s * edge.ex, edge.y + s * edge.ey, edge.nx, edge.ny, 2 * found)
+
+
+@formula
+def displaced(qx: float, qy: float, qt: float, a: float, b: float, w: float, s: float) -> Any:
+    """A pose moved by s times a body twist for unit time: X · exp(s V)."""
+    a, b, w = s * a, s * b, s * w
+    if abs(w) > 1e-4:  # below it the next term of the series is less than rounding
+        sine, versine = math.sin(w) / w, (1 - math.cos(w)) / w
+    else:
+        sine, versine = 1 - w * w / 6, w / 2 - w * w * w / 24
+    x, y = sine * a - versine * b, versine * a + sine * b
+    c, d = math.cos(qt), math.sin(qt)
+    return qx + c * x - d * y, qy + d * x + c * y, qt + w
+
+
+@formula
+def _hand_at(move: Move, k: int, s: float) -> Any:
+    """The pose of hand k after a part s of its step."""
+    hand, step = move.hands[k], move.steps[k]
+    if move.kind == BODY:
+        return displaced(hand.x, hand.y, hand.angle, step.x, step.y, step.angle, s)
+    return hand.x + s * step.x, hand.y + s * step.y, hand.angle + s * step.angle
+
+
+@formula
+def _tip(setting: Setting, move: Move, i: int, s: float, qx: float, qy: float, qt: float) -> Any:
+    """The centre of fingertip i in O, with the object at the pose q."""
+    hx, hy, ht = _hand_at(move, i if len(move.hands) > 1 else 0, s)
+    finger = setting.fingers[i]
+    c, d = math.cos(ht), math.sin(ht)
+    x, y = hx + c * finger.x - d * finger.y - qx, hy + d * finger.x + c * finger.y - qy
+    c, d = math.cos(qt), math.sin(qt)
+    return c * x + d * y, c * y - d * x
+
+
+@formula
+def _gap(setting: Setting, move: Move, s: float, qx: float, qy: float, qt: float, mask: int) -> float:
+    """The least gap of the fingers' contacts that are not in the mask, two bits to a finger."""
+    least = np.inf
+    for i in range(len(setting.fingers)):
+        x, y = _tip(setting, move, i, s, qx, qy, qt)
+        place = nearest(setting.outline, x, y)
+        other = np.inf
+        if mask >> (2 * i) & 1:
+            if not mask >> (2 * i + 1) & 1:
+                other = second(setting.outline, x, y, place.feature).distance
+        else:
+            other = place.distance
+        least = min(least, other - setting.radius)
+    return least
+
+
+@formula
+def _set_contact(contact: Row, setting: Setting, move: Move, i: int, s: float, q: Any, place: Place) -> None:
+    """Writes a contact of finger i at a place, with the object at the pose q."""
+    # The finger turns with its hand: its material velocity at the contact, in O.
+    k = i if len(move.hands) > 1 else 0
+    hx, hy, ht = _hand_at(move, k, s)
+    step = move.steps[k]
+    qx, qy, qt = q
+    co, so = math.cos(qt), math.sin(qt)
+    rx, ry = qx + co * place.x - so * place.y - hx, qy + so * place.x + co * place.y - hy
+    ux, uy = step.x, step.y
+    if move.kind == BODY:
+        ch, sh = math.cos(ht), math.sin(ht)
+        ux, uy = ch * step.x - sh * step.y, sh * step.x + ch * step.y
+    ux, uy = ux - step.angle * ry, uy + step.angle * rx
+    contact.x, contact.y, contact.nx, contact.ny = (
+        place.x - setting.cof_x,
+        place.y - setting.cof_y,
+        place.nx,
+        place.ny,
+    )
+    contact.ux, contact.uy = co * ux + so * uy, co * uy - so * ux
+    contact.gap, contact.finger, contact.feature = place.distance - setting.radius, i, place.feature
+
+
+@formula
+def _contacts(
+    setting: Setting, move: Move, s: float, qx: float, qy: float, qt: float, mask: int, contacts: Rows
+) -> Any:
+    """Writes the contacts in the mask, or all that touch; returns their number and the mask."""
+    count, found = 0, 0
+    touch = TOUCH * setting.outline.size
+    for i in range(len(setting.fingers)):
+        x, y = _tip(setting, move, i, s, qx, qy, qt)
+        place = nearest(setting.outline, x, y)
+        first = place.distance - setting.radius <= touch if mask < 0 else (mask >> (2 * i) & 1) == 1
+        if not first and place.distance - setting.radius > touch:
+            continue
+        for slot in range(2):
+            if slot == 1:
+                place = second(setting.outline, x, y, place.feature)
+            if mask < 0:
+                takes = place.distance - setting.radius <= touch
+            else:
+                takes = (mask >> (2 * i + slot) & 1) == 1 and place.distance < np.inf
+            if takes:
+                found |= 1 << (2 * i + slot)
+                if count < len(contacts):
+                    _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), place)
+                count += 1
+    return count, found
+
+
+@formula
+def _twist(setting: Setting, count: int, scratch: Scratch) -> Any:
+    """Status, modes and the body twist about O's origin of the contacts in the scratch."""
+    c, ell, mu = scratch.contacts, setting.surface.unit, setting.friction
+    if count == 0:
+        return GOING, REST, REST, 0.0, 0.0, 0.0
+    if count == 1:
+        at = c[0]
+        m0, vx, vy, w, _ = one(setting.surface, at.x / ell, at.y / ell, at.nx, at.ny, at.ux, at.uy, mu)
+        m1, status = REST, GOING
+    elif count == 2:
+        for i in range(2):
+            c[i].x /= ell
+            c[i].y /= ell
+        status, m0, m1, vx, vy, w = two(setting.surface, mu, scratch)
+        for i in range(2):
+            c[i].x *= ell
+            c[i].y *= ell
+    else:
+        return MANY, REST, REST, 0.0, 0.0, 0.0
+    w /= ell
+    return status, m0, m1, vx + w * setting.cof_y, vy - w * setting.cof_x, w
+
+
+@formula
+def _slope(ma: float, mb: float, mw: float, a: float, b: float, w: float) -> Any:
+    """Rate of the displacement's logarithm when the body, displaced by exp(m), has a body twist V.
+
+    V + [m, V] / 2 + [m, [m, V]] / 12: the inverse of the exponential's differential to the order of the step.
+    """
+    x, y = -mw * b + w * mb, mw * a - w * ma
+    u, v = -mw * y, mw * x
+    return a + 0.5 * x + u / 12, b + 0.5 * y + v / 12, w
+
+
+@formula
+def _settle(setting: Setting, move: Move, s: float, q: Row, mask: int, lax: int, contacts: Rows) -> None:
+    """Moves the object so that the contacts of the mask touch exactly, those of the bits `lax` only if they overlap.
+
+    Three times, so that what the curved normals leave is of fourth order.
+    """
+    ell = LEVER * setting.outline.size
+    for _ in range(3):
+        count, _ = _contacts(setting, move, s, q.x, q.y, q.angle, mask, contacts)
+        ga = gb = ax = ay = at = bx = by = bt = 0.0
+        rows = 0
+        for i in range(min(count, 2)):
+            c = contacts[i]
+            if lax >> i & 1 and c.gap >= 0:
+                continue
+            t = (c.x * c.ny - c.y * c.nx) / ell
+            if rows == 0:
+                ax, ay, at, ga = c.nx, c.ny, t, -c.gap
+            else:
+                bx, by, bt, gb = c.nx, c.ny, t, -c.gap
+            rows += 1
+        if rows == 0 or max(abs(ga), abs(gb)) < 1e-15 * setting.outline.size:
+            return
+        if rows == 1:
+            # One contact: along its normal, without a turn, as the finger's push leaves its bearing.
+            x, y, w = ga * ax, ga * ay, 0.0
+        else:
+            # The least move that closes both gaps; where the two normals are nearly one, the mean of both.
+            a, b, ab = ax * ax + ay * ay + at * at, bx * bx + by * by + bt * bt, ax * bx + ay * by + at * bt
+            lift = 1e-9 * (a + b)
+            det = (a + lift) * (b + lift) - ab * ab
+            p, r = ((b + lift) * ga - ab * gb) / det, ((a + lift) * gb - ab * ga) / det
+            x, y, w = p * ax + r * bx, p * ay + r * by, (p * at + r * bt) / ell
+        # About the COF.
+        co, so = math.cos(q.angle), math.sin(q.angle)
+        x, y = x + w * setting.cof_y, y - w * setting.cof_x
+        q.x += co * x - so * y
+        q.y += so * x + co * y
+        q.angle += w
+
+
+@formula
+def push_out(setting: Setting, q: Row, hands: Rows, scratch: Scratch) -> None:
+    """Moves an object at q that overlaps fingers out of them, the shortest way."""
+    for k in range(len(hands)):
+        scratch.steps[k].x = scratch.steps[k].y = scratch.steps[k].angle = 0.0
+    move = Move(hands, scratch.steps, AS_IT_IS)
+    for _ in range(50):
+        worst, mask = 0.0, 0
+        for i in range(len(setting.fingers)):
+            x, y = _tip(setting, move, i, 0.0, q.x, q.y, q.angle)
+            place = nearest(setting.outline, x, y)
+            if place.distance - setting.radius < 0:
+                mask |= 1 << (2 * i)
+                worst = max(worst, setting.radius - place.distance)
+            if second(setting.outline, x, y, place.feature).distance - setting.radius < 0:
+                mask |= 1 << (2 * i + 1)
+        if worst <= 1e-3 * TOUCH * setting.outline.size:
+            break
+        _settle(setting, move, 0.0, q, mask, 0, scratch.contacts)
+
+
+@formula
+def _travel(setting: Setting, move: Move) -> float:
+    """The longest way of a finger or of a point of the object held by it, in a step of the hands [m]."""
+    travel = 0.0
+    for i in range(len(setting.fingers)):
+        step = move.steps[i if len(move.hands) > 1 else 0]
+        reach = math.hypot(setting.fingers[i].x, setting.fingers[i].y) + setting.outline.size
+        travel = max(travel, math.hypot(step.x, step.y) + abs(step.angle) * reach)
+    return travel
+
+
+@formula
+def _see(setting: Setting, move: Move, s: float, q: Row, now: Rows) -> None:
+    """Writes each finger's nearest point and gap."""
+    for i in range(len(setting.fingers)):
+        x, y = _tip(setting, move, i, s, q.x, q.y, q.angle)
+        place = nearest(setting.outline, x, y)
+        now[i].x, now[i].y, now[i].gap = place.x, place.y, place.distance - setting.radius
+
+
+@formula
+def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
+    """Moves the hands by their steps and the object at q with them, as far as it goes.
+
+    Written in the scratch for each finger: mode in the last step, contact point and gap at the end, and the modes seen
+    on the way as bits.
+
+    Returns:
+        codes.GOING, or why it stopped on the way.
+    """
+    fingers, now, c = len(setting.fingers), scratch.now, scratch.contacts
+    size, radius = setting.outline.size, setting.radius
+    travel = _travel(setting, move)
+    for i in range(fingers):
+        now[i].modes, now[i].mode = 0, REST
+    if _gap(setting, move, 0.0, q.x, q.y, q.angle, 0) < -OVERLAP * size:
+        return INSIDE
+    s, status = 0.0, GOING
+    for _ in range(MOST_STEPS):
+        if s >= 1.0:
+            break
+        qx, qy, qt = q.x, q.y, q.angle
+        n, mask = _contacts(setting, move, s, qx, qy, qt, ALL_THAT_TOUCH, c)
+        status, m0, m1, a, b, w = _twist(setting, n, scratch)
+        if status != GOING:
+            if status == JAMMED:
+                status = GRASPED
+                for k in range(len(move.hands)):
+                    step = move.steps[k]
+                    if step.x == 0.0 and step.y == 0.0 and step.angle == 0.0:
+                        status = JAMMED
+            break
+        f0, f1 = (c[0].feature if n > 0 else -1), (c[1].feature if n > 1 else -1)
+        i0, i1 = (c[0].finger if n > 0 else -1), (c[1].finger if n > 1 else -1)
+        stretch = STEP * size
+        for i in range(n):
+            if not setting.outline.circle and c[i].feature % 2 == 1:
+                stretch = min(stretch, max(CORNER_STEP * radius, SHARP_STEP * size))
+        if n == 0:
+            # Nothing moves the object before the fingers have come across the gap.
+            stretch = max(stretch, 0.9 * _gap(setting, move, s, qx, qy, qt, mask))
+        h = (1 - s) / max(1.0, math.ceil((1 - s) * travel / stretch - 1e-9))
+        shortest = h / (1 << HALVINGS)
+        settled = 0
+        e0, e1 = m0, m1
+        da = db = dw = 0.0
+        for _ in range(60):
+            a1, b1, w1 = a, b, w
+            da, db, dw = a, b, w
+            e0, e1 = m0, m1
+            changed = False
+            if n > 0:
+                n1 = n
+                for stage in range(3):
+                    share = 0.5 if stage < 2 else 1.0
+                    ma, mb, mw = share * h * a1, share * h * b1, share * h * w1
+                    x, y, t = displaced(qx, qy, qt, ma, mb, mw, 1.0)
+                    n1, _ = _contacts(setting, move, s + share * h, x, y, t, mask, c)
+                    status, e0, e1, ta, tb, tw = _twist(setting, n1, scratch)
+                    if status != GOING or n1 != n:
+                        changed = True
+                        status = GOING
+                        break
+                    a1, b1, w1 = _slope(ma, mb, mw, ta, tb, tw)
+                    weight = 2.0 if stage < 2 else 1.0
+                    da, db, dw = da + weight * a1, db + weight * b1, dw + weight * w1
+                    if e0 != m0 or e1 != m1 or c[0].feature != f0 or (n > 1 and c[1].feature != f1):
+                        changed = True
+                if changed and h > shortest * 1.5:
+                    h *= 0.5
+                    continue
+                if n1 != n:
+                    da, db, dw = 6 * a, 6 * b, 6 * w
+                    e0, e1 = m0, m1
+                da, db, dw = da / 6, db / 6, dw / 6
+            if settled == SETTLES:
+                break
+            hit, before = _first_touch(setting, move, s, q, (da, db, dw), h, mask, 2 * travel * h)
+            if not hit:
+                break
+            h = max(before, 1e-9) * h
+            settled += 1  # and again, since the shorter step moves the object a little otherwise
+        q.x, q.y, q.angle = displaced(qx, qy, qt, da, db, dw, h)
+        s = 1.0 if s + h > 1 - 1e-12 else s + h
+        if n > 0:
+            lax = (1 if e0 in (SEPARATION, REST) else 0) | (2 if e1 in (SEPARATION, REST) else 0)
+            _settle(setting, move, s, q, mask, lax, c)
+        for i in range(fingers):
+            mode = -1
+            if i0 == i:
+                mode = m0
+            if i1 == i and mode != STICKING:
+                mode = m1 if mode < 0 or mode == SEPARATION else (m1 if m1 == STICKING else mode)
+            if mode < 0:
+                mode = SEPARATION
+            now[i].mode = mode
+            now[i].modes |= 1 << mode
+    else:
+        status = UNDECIDED
+    _see(setting, move, s, q, now)
+    for k in range(len(move.hands)):
+        hand = move.hands[k]
+        hand.x, hand.y, hand.angle = _hand_at(move, k, s)
+    return status
+
+
+@formula
+def _first_touch(
+    setting: Setting, move: Move, s: float, q: Row, V: Any, h: float, mask: int, near: float
+) -> Any:
+    """Whether a contact not in the mask is made in a step h with the twist V from q, and after which part of it.
+
+    If nothing is within `near` [m], nothing can be.
+    """
+    a, b, w = V
+    qx, qy, qt = q.x, q.y, q.angle
+    if _gap(setting, move, s, qx, qy, qt, mask) >= near:
+        return False, 0.0
+    before, hit = 0.0, -1.0
+    for look in range(1, LOOKS + 1):
+        at = look / LOOKS
+        x, y, t = displaced(qx, qy, qt, a, b, w, at * h)
+        if _gap(setting, move, s + at * h, x, y, t, mask) < 0:
+            hit = at
+            break
+        before = at
+    if hit < 0:
+        return False, before
+    while hit - before > 1e-12:
+        middle = 0.5 * (before + hit)
+        x, y, t = displaced(qx, qy, qt, a, b, w, middle * h)
+        gap = _gap(setting, move, s + middle * h, x, y, t, mask)
+        if gap < 0:
+            hit = middle
+        else:
+            before = middle
+            if gap <= 0.5 * TOUCH * setting.outline.size:
+                break
+    return True, before
+
+
+@formula
+def _set_step(step: Row, hand: Row, to: Row, kind: int) -> None:
+    """Writes the displacement from a hand's pose to another, in the kind's terms."""
+    turn = to.angle - hand.angle
+    if kind != AS_IT_IS:
+        turn -= 2 * math.pi * math.floor(turn / (2 * math.pi) + 0.5)
+    dx, dy = to.x - hand.x, to.y - hand.y
+    if kind == BODY:
+        # The logarithm of the step.
+        c, d = math.cos(hand.angle), math.sin(hand.angle)
+        x, y = c * dx + d * dy, c * dy - d * dx
+        half = 0.5 * turn
+        cot = half / math.tan(half) if abs(half) > 1e-6 else 1 - half * half / 3
+        dx, dy = cot * x + half * y, cot * y - half * x
+    step.x, step.y, step.angle = dx, dy, turn
+
+
+@formula
+def follow(
+    setting: Setting, start: Row, poses: Rows, count: int, kind: int, out: Rows, seen: Rows, scratch: Scratch
+) -> Any:
+    """The object under hands that go from pose to pose.
+
+    Args:
+        start: X_WO at the first pose.
+        poses: of `count` hands, one pose of each after the other.
+        kind: codes.STRAIGHT, BODY or AS_IT_IS.
+        out: POSE rows, X_WO at each pose of the hands, or one row: only the last.
+        seen: SEEN rows, one for each finger at each pose, or at the last, then with the modes of the whole way.
+
+    Returns:
+        the outcome as advance, and the number of poses reached.
+    """
+    fingers = len(setting.fingers)
+    hands, steps, now = scratch.hands[:count], scratch.steps[:count], scratch.now
+    q = scratch.q[0]
+    q.x, q.y, q.angle = start.x, start.y, start.angle
+    all_poses, all_seen = len(out) > 1, len(seen) > fingers
+    for k in range(count):
+        hands[k].x, hands[k].y, hands[k].angle = poses[k].x, poses[k].y, poses[k].angle
+        steps[k].x = steps[k].y = steps[k].angle = 0.0
+    for i in range(len(seen)):
+        seen[i].modes = 0
+    status, reached, number = GOING, 0, len(poses) // count
+    for m in range(number):
+        if status == GOING:
+            if m > 0:
+                for k in range(count):
+                    _set_step(steps[k], hands[k], poses[m * count + k], kind)
+            status = advance(setting, Move(hands, steps, kind), q, scratch)
+            reached += status == GOING
+        row = m if all_poses else 0
+        out[row].x, out[row].y, out[row].angle = q.x, q.y, q.angle
+        for i in range(fingers):
+            to = seen[m * fingers + i if all_seen else i]
+            to.x, to.y, to.gap, to.mode = now[i].x, now[i].y, now[i].gap, now[i].mode
+            to.modes |= now[i].modes
+    return status, reached
