@@ -138,7 +138,9 @@ if TYPE_CHECKING:
         Scene,
         Workspace,
     )
-    from .simulation import Claim, Noise, Perturbation, Proof, Report, Runs, prove, simulate, study, verify
+    from .simulation import Claim, Noise, Perturbation, Proof, Report, Runs, prove, simulate
+    from .simulation.study import study
+    from .simulation.verify import verify
     from .steering import dubins, flat_output
 
 

@@ -26,7 +26,8 @@ from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, overload
 
-from . import compiling, formulas, kernel_store
+from . import compiling, kernel_store
+from .formulas import CHOICES, FORMULAS
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -272,12 +273,12 @@ event.register("numba:compile", _Watch())
 
 def _learn_formulas() -> None:
     """Tells the compiler of the formulas and choices collected since it was last told."""
-    for function in formulas.FORMULAS:
+    for function in FORMULAS:
         overload(function, jit_options=_PLAIN | _WITHIN | _LENT, strict=False)(_itself(function))
-    for chosen, ways in formulas.CHOICES:
+    for chosen, ways in CHOICES:
         overload(chosen, jit_options=_PLAIN | _WITHIN | _LENT, strict=False)(_way_of(ways))
-    formulas.FORMULAS.clear()
-    formulas.CHOICES.clear()
+    FORMULAS.clear()
+    CHOICES.clear()
 
 
 def _itself(function: Callable[..., object]) -> Callable[..., object]:
