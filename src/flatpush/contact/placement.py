@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry import Outline, OutlinePoint, cross, perpendicular, rotate, wrap_angle
@@ -13,6 +14,8 @@ from ..geometry.pose import Array
 SMOOTH_CORNER = np.deg2rad(20.0)
 # Two fingers turn until both touch: how finely and how far is looked for that.
 STEP, SCAN = np.deg2rad(2.0), 22
+# Of an outline with more edges, those that cannot be touched first are passed over.
+MANY = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,10 @@ def place_fingers(
         y = perpendicular(x)
         back = at.point - 2 * outline.size * x
         starts = np.concatenate([back + spacing / 2 * y, back - spacing / 2 * y])
+        if len(outline.vertices) > MANY:  # each tip by itself meets fewer edges
+            m = len(x)
+            left, right = (travels(outline, q, x, tip_radius) for q in (starts[:m], starts[m:]))
+            return np.stack([left[0], right[0]]), np.stack([left[1], right[1]])
         ways, touched = travels(outline, starts, np.concatenate([x, x]), tip_radius)
         return ways.reshape(2, -1), touched.reshape(2, -1, 2)
 
@@ -112,7 +119,13 @@ def travels(outline: Outline, starts: Array, directions: Array, tip_radius: floa
         out = q + np.where(np.isfinite(ways), ways, 0.0)[:, None] * directions - outline.centre
         return ways, outline.centre + outline.radius * out / np.linalg.norm(out, axis=1)[:, None]
     a, b = outline.edges[:, 0], outline.edges[:, 1]
-    inward, d = outline.edge_normals, b - a
+    inward = outline.edge_normals
+    if len(a) > MANY:
+        met = _in_the_way(outline, q, directions, tip_radius)
+        a, b, inward = a[met], b[met], inward[met]
+        if not len(a):
+            return np.full(len(q), np.inf), q.copy()
+    d = b - a
     closing = directions @ inward.T
     gap = np.sum(inward * (a - tip_radius * inward), axis=1) - q @ inward.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -128,6 +141,26 @@ def travels(outline: Outline, starts: Array, directions: Array, tip_radius: floa
     ways = np.where(on_edge, first, to_corners[rows, corner])
     there = q + np.where(np.isfinite(first), first, 0.0)[:, None] * directions + tip_radius * inward[edge]
     return ways, np.where(on_edge[:, None], there, a[corner])
+
+
+def _in_the_way(outline: Outline, q: Array, directions: Array, tip_radius: float) -> NDArray[np.intp]:
+    """Numbers of the edges that the discs of a narrow fan of ways may touch first, with their neighbours."""
+    middle = directions[len(q) // 2]
+    across = perpendicular(middle)
+    offsets = (q - q[0]) @ across
+    turned = np.abs(cross(middle, directions)).max()
+    if np.min(directions @ middle) <= 0:
+        return np.arange(len(outline.vertices))
+    lateral = (outline.vertices - q[0]) @ across
+    reach = np.abs((outline.vertices - q[0]) @ middle).max() + np.ptp(offsets) + tip_radius
+    room = tip_radius + turned * reach / np.min(directions @ middle) + 1e-9 * outline.size
+    other = np.roll(lateral, -1)
+    beside = np.minimum(lateral, other) <= offsets.max() + room
+    beside &= np.maximum(lateral, other) >= offsets.min() - room
+    # A disc first touches edges that face it, or their corners.
+    faces = outline.edge_normals @ middle > -turned - 1e-12
+    met = beside & faces
+    return np.flatnonzero(met | np.roll(met, 1))
 
 
 def _ray_circles(q: Array, directions: Array, centres: Array, radius: float) -> Array:

@@ -4,10 +4,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .pose import Array, cross, perpendicular
+
+# Differences below this part of the size are none, so that rounding decides nothing.
+_EQUAL = 1e-7
+# A direction in which corners of equal shapes seldom lie equally far.
+_GENERIC = np.array([np.cos(0.3), np.sin(0.3)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +118,65 @@ class Outline:
         """The largest distance between two of its points [m]."""
         if self.is_circle:
             return 2 * self.radius
-        return max(self.radius_about(vertex) for vertex in self.vertices)
+        from shapely import Polygon
+        from shapely.geometry.polygon import orient
+
+        # The farthest two are antipodal corners of the convex hull: at an end of one of its edges, and at the corner
+        # that is farthest on the side where this edge's normal points away from.
+        hull = np.array(orient(Polygon(self.vertices).convex_hull).exterior.coords)[:-1]
+        edges = np.roll(hull, -1, axis=0) - hull
+        angles = np.unwrap(np.arctan2(edges[:, 1], edges[:, 0]))
+        turned = angles[0] + (angles + np.pi - angles[0]) % (2 * np.pi)
+        opposite = np.searchsorted(angles, turned)  # edges before this one run that way or less far round
+        near = np.arange(len(hull))
+        pairs = [(near + i, opposite + j) for i in (0, 1) for j in (-1, 0, 1)]
+        ends = np.hstack([hull[a % len(hull)] - hull[b % len(hull)] for a, b in pairs])
+        return float(np.max(np.linalg.norm(ends.reshape(-1, 2), axis=1)))
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """Numbers of the edges counter-clockwise from a corner that does not depend on how the outline is written.
+
+        It is the corner farthest from the centroid; of several, the one farthest east, a little north.
+        """
+        about = self.vertices - self.centroid
+        distance = np.hypot(*about.T)
+        farthest = distance >= distance.max() - _EQUAL * self.size
+        east = np.where(farthest, about @ _GENERIC, -np.inf)
+        first = int(np.argmax(east))
+        count = np.arange(len(about))
+        return (first + count) % len(about) if self.sense > 0 else (first - 1 - count) % len(about)
+
+    def simplified(self, tolerance: float) -> "Outline":
+        """A polygon with fewer corners, all of them corners of this one, that stays within the tolerance of it [m].
+
+        It is written counter-clockwise from the same corner, however this one is written. This one itself if there is
+        no such polygon.
+        """
+        if self.is_circle:
+            return self
+        corners = self.vertices[self.order if self.sense > 0 else (self.order + 1) % len(self.vertices)]
+        closed = np.concatenate([corners, corners[:1]])
+        last = len(corners)
+        kept = [0]
+        while kept[-1] < last:
+            # As far as a straight line may go: first by doubling, then by halving what is between.
+            here = kept[-1]
+            good, step = here + 1, 2
+            while here + step <= last and _near_chord(closed[here : here + step + 1], tolerance):
+                good, step = here + step, 2 * step
+            bad = min(here + step, last + 1)
+            while bad - good > 1:
+                middle = (good + bad) // 2
+                if _near_chord(closed[here : middle + 1], tolerance):
+                    good = middle
+                else:
+                    bad = middle
+            kept.append(good)
+        try:
+            return Outline.polygon(corners[kept[:-1]])
+        except InputError:
+            return self
 
     @cached_property
     def edges(self) -> Array:
@@ -198,8 +261,22 @@ class Outline:
         return Outline(self.vertices + d, self.centre + d if self.is_circle else self.centre, self.radius)
 
 
+def _near_chord(points: Array, tolerance: float) -> bool:
+    """Whether points (n, 2) stay within the tolerance of the line from the first to the last of them."""
+    d = points[-1] - points[0]
+    away = points[1:-1] - points[0]
+    length2 = float(d @ d)
+    along = np.clip(away @ d / length2, 0.0, 1.0) if length2 > 0 else np.zeros(len(away))
+    return bool(np.hypot(*(away - along[:, None] * d).T).max(initial=0.0) <= tolerance)
+
+
 def _different(points: Array, tolerance: float) -> Array:
     """The corners without those that repeat the one before, or, at the end, the first."""
+    if len(points) < 2:
+        return points
+    step = np.hypot(*(points - np.roll(points, -1, axis=0)).T)
+    if np.all(step > tolerance):
+        return points
     kept: list[Array] = []
     for point in points:
         if not kept or np.hypot(*(point - kept[-1])) > tolerance:

@@ -16,6 +16,16 @@ from .options import PushOption, push_option
 STRETCH = np.deg2rad(90.0)
 COARSE, REFINED = 9, 8
 MOST = 8
+# An outline of more corners is simplified, within this part of its size, for the search of places.
+MANY, SIMPLE = 30, 5e-4
+# Then places on a stretch are tried around the best of a quick guess, in fractions of its length, and closer by.
+AROUND, CLOSER = (0.0, -0.15, 0.15), 0.06
+# On the outline itself, places beside that are tried, in parts SIMPLE of the size.
+BESIDE = 0.2  # of an edge, next to a corner where the normal passes the COF
+ASIDE = (0.3, 2, -2, 6, -6, 12, -12)
+# A polygon of so many corners has edges that can be counted; sides of others are named by the compass.
+FEW = 20
+EQUAL = 1e-7  # radii that differ by this part are equal
 # What of how to plan makes a push a good one.
 ASKED = "model", "two_finger", "friction_margin", "cost"
 Found = tuple[tuple[Push, ...], tuple[PushOption, ...]]
@@ -30,6 +40,7 @@ class Stretch:
     edges: tuple[int, ...]
     lengths: Array  # of the edges [m]; for a circle one quarter of the turn
     offset: float = 0.0  # where a circle's quarter starts, as a fraction of a turn
+    backwards: bool = False  # whether the edges are passed from their second corner to their first
 
     def at(self, outline: Outline, fraction: float) -> OutlinePoint:
         """The point at a fraction of the stretch's length."""
@@ -38,8 +49,8 @@ class Stretch:
         ends = np.cumsum(self.lengths)
         s = fraction * ends[-1]
         k = min(int(np.searchsorted(ends, s, side="right")), len(self.edges) - 1)
-        along = (s - (ends[k] - self.lengths[k])) / self.lengths[k]
-        return outline.at(self.edges[k], float(np.clip(along, 0.0, 1.0)))
+        along = float(np.clip((s - (ends[k] - self.lengths[k])) / self.lengths[k], 0.0, 1.0))
+        return outline.at(self.edges[k], 1 - along if self.backwards else along)
 
     def square_to(self, outline: Outline, cof: Array) -> Array:
         """Fractions at which the normal passes through the COF: contacts that steer with the least friction."""
@@ -51,11 +62,18 @@ class Stretch:
             fractions = 4 * ((turns - self.offset) % 1.0)
             return fractions[fractions < 1]
         edges = outline.edges[list(self.edges)]
+        if self.backwards:
+            edges = edges[:, ::-1]
         d = edges[:, 1] - edges[:, 0]
         along = np.einsum("ij,ij->i", cof - edges[:, 0], d) / self.lengths**2
         on = (along > 1e-6) & (along < 1 - 1e-6)
         before = np.cumsum(self.lengths) - self.lengths
-        return ((before + along * self.lengths) / self.lengths.sum())[on]
+        found = ((before + along * self.lengths) / self.lengths.sum())[on]
+        # Between two edges the normal may turn past the COF: beside that corner.
+        passed = np.flatnonzero((along[:-1] >= 1) & (along[1:] <= 0))
+        corners = (before + self.lengths)[passed]
+        beside = [corners - BESIDE * self.lengths[passed], corners + BESIDE * self.lengths[passed + 1]]
+        return np.concatenate([found, np.concatenate(beside) / self.lengths.sum()])
 
 
 def automatic_pushes(scene: Scene) -> Found:
@@ -73,10 +91,13 @@ def automatic_pushes(scene: Scene) -> Found:
 
 
 def _automatic_pushes(scene: Scene) -> Found:
+    outline = scene.object.outline
     found: list[PushOption] = []
     refused: list[PushOption] = []
-    for stretch in stretches(scene.object.outline):
-        option = _best(scene, stretch)
+    many = len(outline.vertices) > MANY
+    sought = _simplified(scene) if many else scene
+    for stretch in stretches(sought.object.outline):
+        option = _best_of_many(sought, stretch) if many else _best(scene, stretch)
         if option is None:
             continue
         (refused if option.car is None else found).append(option)
@@ -86,7 +107,37 @@ def _automatic_pushes(scene: Scene) -> Found:
         for o in found
         if o not in kept
     ]
+    if many:
+        placed = [_on_outline(scene, option) for option in kept]
+        kept = [option for option in placed if option.car is not None]
+        refused += [option for option in placed if option.car is None]
+        refused = [replace(o, push=replace(o.push, at=outline.nearest(o.push.at.point))) for o in refused]
     return tuple(option.push for option in kept), tuple(refused)
+
+
+def _simplified(scene: Scene) -> Scene:
+    """The scene with an outline of fewer corners, and the support that goes with it."""
+    obj = scene.object
+    outline = obj.outline.simplified(SIMPLE * obj.outline.size)
+    thing = Object(outline, obj.support_word or obj.support, obj.friction, obj.surface, obj.name)
+    return replace(scene, object=thing, pushes="auto")
+
+
+def _on_outline(scene: Scene, option: PushOption) -> PushOption:
+    """The push at the nearest place of the scene's own outline, or a little beside it where it is refused there."""
+    outline = scene.object.outline
+    at = option.push.at
+    along = np.array([at.normal[1], -at.normal[0]])
+    tried = None
+    for k in ASIDE:
+        place = outline.nearest(at.point + k * SIMPLE * outline.size * along)
+        if place.corner:
+            d = outline.edges[place.edge, 1] - outline.edges[place.edge, 0]
+            place = outline.nearest(outline.edges[place.edge].mean(axis=0) if d.any() else place.point)
+        tried = push_option(scene, replace(option.push, at=place), quick=True)
+        if tried.car is not None:
+            break
+    return tried if tried is not None else option
 
 
 def _spread(options: list[PushOption]) -> list[PushOption]:
@@ -95,20 +146,30 @@ def _spread(options: list[PushOption]) -> list[PushOption]:
         return options
     radii = np.array([o.car.radius for o in options if o.car])
     directions = np.array([o.car.direction for o in options if o.car])
-    kept = [int(np.argmin(radii))]
+    kept = [_first(radii)]
     while len(kept) < MOST:
         angles = np.arccos(np.clip(directions @ directions[kept].T, -1.0, 1.0)).min(axis=1)
         worth = angles / np.sqrt(radii)
         worth[kept] = -1.0
-        kept.append(int(np.argmax(worth)))
+        kept.append(_first(-worth))
     return [options[i] for i in sorted(kept)]
+
+
+def _first(values: Array) -> int:
+    """The first of the least values; what differs by rounding is equal."""
+    least = float(np.min(values))
+    if not np.isfinite(least):
+        return int(np.argmin(values))
+    return int(np.flatnonzero(values <= least + EQUAL * abs(least))[0])
 
 
 def stretches(outline: Outline) -> list[Stretch]:
     """Edges of an outline, joined where the corner between them is nearly smooth and the normal has not turned far."""
     if outline.is_circle:
-        return [Stretch(f"side {k + 1}", (0,), np.ones(1), k / 4 - 1 / 8) for k in range(4)]
-    normals = outline.edge_normals
+        names = ("east side", "north side", "west side", "south side")
+        return [Stretch(name, (0,), np.ones(1), k / 4 - 1 / 8) for k, name in enumerate(names)]
+    order = outline.order
+    normals = outline.edge_normals[order]
     n = len(normals)
     turns = np.arccos(np.clip(np.einsum("ij,ij->i", np.roll(normals, 1, axis=0), normals), -1.0, 1.0))
     sharp = np.flatnonzero(turns > SMOOTH_CORNER)
@@ -117,13 +178,70 @@ def stretches(outline: Outline) -> list[Stretch]:
     found: list[list[int]] = []
     turned = 0.0
     for k in range(n):
-        edge = (first + k) % n
-        turned += float(turns[edge])
-        if not found or turns[edge] > SMOOTH_CORNER or turned > STRETCH:
+        place = (first + k) % n
+        turned += float(turns[place])
+        if not found or turns[place] > SMOOTH_CORNER or turned > STRETCH:
             found.append([])
             turned = 0.0
-        found[-1].append(edge)
-    return [Stretch(f"edge {g[len(g) // 2]}", tuple(g), lengths[g]) for g in found]
+        found[-1].append(int(order[place]))
+    named: list[Stretch] = []
+    for g in found:
+        name = f"edge {g[0]}"
+        if len(g) > 1 or n > FEW:
+            name = _side(outline.edge_normals[g[len(g) // 2]], [stretch.name for stretch in named])
+        named.append(Stretch(name, tuple(g), lengths[g], backwards=outline.sense < 0))
+    return named
+
+
+def _side(inward: Array, taken: list[str]) -> str:
+    """The name of a side by the compass, east along +x of the drawing; numbered where there are several."""
+    winds = "east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east"
+    name = f"{winds[round(float(np.arctan2(-inward[1], -inward[0])) / (np.pi / 4)) % 8]} side"
+    number = 1 + sum(other == name or other.startswith(f"{name} ") for other in taken)
+    return name if number == 1 else f"{name} {number}"
+
+
+def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
+    """The best place by one finger and an ellipsoid, which is quick to tell, then around it as the scene asks."""
+    quick = replace(
+        scene, planning=replace(scene.planning, model="ellipsoid"), pusher=replace(scene.pusher, fingers=1)
+    )
+    guess = _best(quick, stretch)
+    if guess is None:
+        return None
+    outline = scene.object.outline
+    ends = np.cumsum(stretch.lengths)
+    k = stretch.edges.index(guess.push.at.edge)
+    along = 1 - guess.push.at.along if stretch.backwards else guess.push.at.along
+    middle = float((ends[k] - stretch.lengths[k] + along * stretch.lengths[k]) / ends[-1])
+    tried: list[PushOption] = []
+    radii: list[float] = []
+    places: list[float] = []
+
+    def look(fraction: float) -> None:
+        at = stretch.at(outline, fraction)
+        if 0 < fraction < 1 and not at.corner and fraction not in places:
+            pusher = scene.pusher
+            push = Push(stretch.name, at, pusher.fingers, pusher.spacing if pusher.fingers == 2 else 0.0)
+            tried.append(push_option(scene, push, quick=True))
+            places.append(fraction)
+            car = tried[-1].car
+            radii.append(np.inf if car is None else car.radius)
+
+    for step in AROUND:
+        look(middle + step)
+    if not np.isfinite(min(radii, default=np.inf)):
+        for fraction in (np.arange(COARSE) + 0.5) / COARSE:
+            look(float(fraction))
+    if not tried:
+        return None
+    best = _first(np.array(radii))
+    if np.isfinite(radii[best]):
+        centre = places[best]
+        for step in (-CLOSER, CLOSER):
+            look(centre + step)
+        best = _first(np.array(radii))
+    return tried[best]
 
 
 def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
@@ -144,7 +262,7 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
     grid = grid[np.argsort(np.abs(grid - 0.5), kind="stable")]  # of equals, the one in the middle
     grid = np.concatenate([stretch.square_to(scene.object.outline, scene.object.cof), grid])
     radii = [radius(float(f)) for f in grid]
-    k = int(np.argmin(radii))
+    k = _first(np.array(radii))
     if np.isfinite(radii[k]):
         centre, width, best = float(grid[k]), 1.0 / COARSE, radii[k]
         for _ in range(REFINED):
