@@ -21,7 +21,7 @@ from flatpush.planning.obstacles import Task, task_of
 def carved_task(seed: int) -> Task:
     """The task of a carved scene with the one push of its path."""
     found = carved(seed, pushes=1)
-    planner = fp.Planner(replace(found.scene, pushes=(found.legs[0].option.push,)), tree=False)
+    planner = fp.Planner(replace(found.scene, pushes=(found.legs[0].option.push,)))
     return task_of(planner.scene, planner.usable, planner.fleet)
 
 
@@ -56,14 +56,14 @@ def gap(plan: fp.Plan) -> float:
 
 
 def main(count: int, seconds: float, limit: float) -> None:
-    fp.Planner(carved(0).scene, tree=False).plan()
+    fp.Planner(carved(0).scene).plan()
     built, first, gaps, unsolved, late = [], [], [], [], []
     for seed in range(count):
         scene = replace(
             carved(seed).scene, planning=fp.Planning(seed=seed, time_limit=limit, iterations=10**6)
         )
         began = time.thread_time()
-        planner = fp.Planner(scene, tree=False)
+        planner = fp.Planner(scene)
         built.append(time.thread_time() - began)
         clock, best = time.perf_counter(), None
         for answer in planner.answers():

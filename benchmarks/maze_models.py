@@ -27,7 +27,7 @@ def main(seconds: float, seeds: int) -> None:
                     scene.planning, model=model, two_finger=fingers, friction_margin=0.0, clearance=0.0,
                     time_limit=seconds, seed=max(seed, 0), iterations=10**9,
                 )  # fmt: skip
-                planner = fp.Planner(replace(scene, planning=planning), tree=False)
+                planner = fp.Planner(replace(scene, planning=planning))
                 began, best = time.perf_counter(), None
                 for answer in planner.answers():
                     best = answer

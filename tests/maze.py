@@ -29,7 +29,7 @@ def maze_scene(**planning) -> fp.Scene:
 
 def maze_task(need=0.0) -> Task:
     """The search of that maze."""
-    planner = fp.Planner(maze_scene(), tree=False)
+    planner = fp.Planner(maze_scene())
     return replace(task_of(planner.scene, planner.usable, planner.fleet), clearance=need)
 
 

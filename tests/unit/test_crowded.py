@@ -15,7 +15,7 @@ from flatpush.simulation.clearance import clearance_of
 
 def planned(scene, **planning):
     return Planner(
-        replace(scene, planning=replace(scene.planning, time_limit=60, **planning)), tree=False
+        replace(scene, planning=replace(scene.planning, time_limit=60, **planning)),
     ).plan()
 
 
@@ -23,7 +23,7 @@ def planned(scene, **planning):
 def test_the_path_that_a_scene_is_carved_along_keeps_clear(seed):
     """By the judge, with landing, leaving and all transits; so there is a plan whatever the planner finds."""
     found = carved(seed)
-    segments = assemble(found.scene, Planner(found.scene, tree=False).transits, found.legs)
+    segments = assemble(found.scene, Planner(found.scene).transits, found.legs)
     assert clearance_of(found.scene, segments) > 0.0005
     end = segments[-2].object[-1]
     assert np.allclose(end, found.scene.goal_pose, atol=1e-9)

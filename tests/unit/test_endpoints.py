@@ -27,7 +27,7 @@ def answer(
         workspace=fp.Workspace(bounds, obstacles),
         planning=fp.Planning(clearance=clearance, iterations=1, **planning),
     )
-    return next(iter(fp.Planner(scene, tree=False).answers()))
+    return next(iter(fp.Planner(scene).answers()))
 
 
 @pytest.mark.parametrize(

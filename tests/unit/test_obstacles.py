@@ -171,7 +171,7 @@ def body_steps(segment):
 
 def test_the_planner_plans_the_maze_with_a_certificate():
     seen = []
-    planner = fp.Planner(maze_scene(), tree=False, progress=lambda *told: seen.append(told))
+    planner = fp.Planner(maze_scene(), progress=lambda *told: seen.append(told))
     answers = list(planner.answers())
     costs = [answer.cost for answer in answers]
     assert costs == sorted(costs, reverse=True)
@@ -194,7 +194,7 @@ def test_the_planner_plans_the_maze_with_a_certificate():
 
 
 def test_plans_among_obstacles_repeat():
-    one, two = (fp.Planner(maze_scene(seed=2), tree=False).plan() for _ in range(2))
+    one, two = (fp.Planner(maze_scene(seed=2)).plan() for _ in range(2))
     assert one.cost == two.cost
     assert [s.word for s in one.pushes] == [s.word for s in two.pushes]
 
@@ -204,7 +204,7 @@ def test_an_interrupt_passes_through():
         if np.isfinite(cost):
             raise KeyboardInterrupt
 
-    planner = fp.Planner(maze_scene(), tree=False, progress=interrupt)
+    planner = fp.Planner(maze_scene(), progress=interrupt)
     answers = planner.answers()
     kept = next(answers)
     with pytest.raises(KeyboardInterrupt):
@@ -216,7 +216,7 @@ def test_walled_in_goals_end_with_words():
     scene = maze_scene()
     wall = np.array([(0.0, 0.06), (0.23, 0.06), (0.23, 0.0884), (0.0, 0.0884)])
     closed = replace(scene, workspace=replace(scene.workspace, obstacles=(*scene.workspace.obstacles, wall)))
-    plan = fp.Planner(closed, tree=False).plan()
+    plan = fp.Planner(closed).plan()
     assert plan.status == "no_plan"
     assert "has no way from the start to the goal" in plan.reason
     # A slit that a disc inside the object passes, but not the object with fingers.
@@ -225,7 +225,7 @@ def test_walled_in_goals_end_with_words():
     tight = replace(
         scene, workspace=replace(scene.workspace, obstacles=(*scene.workspace.obstacles, gap, other))
     )
-    plan = fp.Planner(tight, tree=False).plan()
+    plan = fp.Planner(tight).plan()
     assert plan.status == "no_plan"
     assert "poses were searched from the start and from the goal" in plan.reason
 
@@ -233,15 +233,15 @@ def test_walled_in_goals_end_with_words():
 def test_a_start_in_collision_is_named():
     scene = replace(maze_scene(), start=(0.2, 0.15, 0.0))
     with pytest.raises(fp.InputError, match="at the start the object crosses obstacle 0"):
-        fp.Planner(scene, tree=False).plan()
+        fp.Planner(scene).plan()
 
 
 def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles():
     scene = replace(maze_scene(), start=(0.08, -0.05, 2.0), goal=(0.0, 0.0, 0.0))
     free = replace(scene, workspace=fp.Workspace())
     far = np.array([(0.5, 0.5), (0.6, 0.5), (0.6, 0.6)])
-    kept = fp.Planner(replace(scene, workspace=fp.Workspace(None, (far,))), tree=False).plan()
-    assert kept.cost <= fp.Planner(free, tree=False).plan().cost * (1 + 1e-3)
+    kept = fp.Planner(replace(scene, workspace=fp.Workspace(None, (far,)))).plan()
+    assert kept.cost <= fp.Planner(free).plan().cost * (1 + 1e-3)
 
 
 def test_offered_ways_must_be_free(task):
@@ -266,7 +266,7 @@ def test_round_objects_and_obstacles():
         ),
         planning=fp.Planning(time_limit=60, iterations=300),
     )
-    plan = fp.Planner(scene, tree=False).plan()
+    plan = fp.Planner(scene).plan()
     assert plan.status == "solved"
     assert plan.certificate.clearance >= 0
     assert fp.verify(plan).ok

@@ -24,7 +24,6 @@ def command(
     seed: Annotated[int | None, typer.Option(help="Of the anytime search.")] = None,
     iterations: Annotated[int | None, typer.Option(help="The anytime search stops here.")] = None,
     time_limit: Annotated[float | None, typer.Option(help="Seconds; only cuts the search short.")] = None,
-    tree: Annotated[Path | None, typer.Option(help="Search tree: read if it exists, else written.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
@@ -57,7 +56,7 @@ def command(
         from ..view import check_snapshots
 
         check_snapshots(snapshots)
-    found, explored = _planned(asked, tree)
+    found, explored = _planned(asked)
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))
@@ -91,7 +90,7 @@ def command(
     return 0
 
 
-def _planned(scene: Any, tree: Path | None) -> tuple[Any, Any]:
+def _planned(scene: Any) -> tuple[Any, Any]:
     """The best plan found, and the edges of the search tree or None.
 
     Ctrl-C ends the search; what has been found by then is kept. Among obstacles a line on a
@@ -112,7 +111,7 @@ def _planned(scene: Any, tree: Path | None) -> tuple[Any, Any]:
 
     try:
         with telling("planning"):
-            planner = Planner(scene, tree or False, progress if live else None)
+            planner = Planner(scene, progress if live else None)
             for answer in planner.answers():
                 best = answer
     except KeyboardInterrupt:

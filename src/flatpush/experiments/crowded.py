@@ -146,7 +146,7 @@ def run(figures: Path | None) -> str:
     """A table of all scenes; into the folder, a drawing of each plan."""
     rows = ["scene            obstacles  first path   best   clearance"]
     for name, make in SCENES.items():
-        planner = Planner(make(), tree=False)
+        planner = Planner(make())
         plan = planner.plan()
         count = len(plan.scene.workspace.obstacles)
         if plan.certificate is None:
@@ -175,7 +175,7 @@ def _thing(number: int, friction: int) -> tuple[Object, Pusher, tuple[PushOption
     """An object, its pusher and the pushes that are cars: the same ones for every scene, so they are sought once."""
     thing = Object(OBJECTS[number], "uniform", friction=FRICTIONS[friction])
     pusher = Pusher(fingers=2, spacing=0.015)
-    return thing, pusher, Planner(Scene(thing, (0.1, 0.0, 0.0), pusher=pusher), tree=False).usable
+    return thing, pusher, Planner(Scene(thing, (0.1, 0.0, 0.0), pusher=pusher)).usable
 
 
 def _driven(thing: Object, pusher: Pusher, option: PushOption) -> tuple[Any, Array, float]:

@@ -185,7 +185,7 @@ def controlled(law: Law, learn: bool, scene: Scene, rate: float) -> HorizonContr
     """The controller of a law for a task."""
     if law == "horizon":
         return HorizonController.of(scene, rate=rate, learn=learn)
-    plan = Planner(scene, tree=False).plan()
+    plan = Planner(scene).plan()
     return PlanController.of(plan, law, rate, learn=learn)
 
 

@@ -2,10 +2,10 @@
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,13 +27,10 @@ from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
 
-if TYPE_CHECKING:
-    from .graph import Tree
-
 # A round of the search counts as this many of the scene's iterations.
 ROUND = 3300
-# Poses of the search tree, and how many of its ways are refined.
-SAMPLES, SEEDS = 1500, 30
+# Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
+ROUNDS_OF_MANY = 1
 
 
 class Planner:
@@ -41,8 +38,6 @@ class Planner:
 
     Args:
         scene: its start is the default start of plan().
-        tree: whether a search tree towards the goal is built to start the search from (kept in a cache keyed by
-            content), or the file to keep it in: read if it exists, else written. For one start it does not pay.
         progress: called among obstacles after every round of the search, some hundredths of a second, with the cost
             so far (infinite: none), the seconds since it began and the number of poses in its trees.
 
@@ -59,9 +54,7 @@ class Planner:
     [True, True]
     """
 
-    def __init__(
-        self, scene: Scene, tree: bool | str | Path = True, progress: Progress | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, progress: Progress | None = None) -> None:
         self.left_out: tuple[PushOption, ...] = ()
         if scene.pushes == "auto":
             pushes, self.left_out = automatic_pushes(scene)
@@ -69,7 +62,6 @@ class Planner:
         self.scene = scene
         self.options = () if scene.pushes == "auto" else push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
-        self._tree = tree
         self._progress = progress
         self._around: Around | None = None
 
@@ -91,8 +83,12 @@ class Planner:
         return best.plan()
 
     def plans(self, starts: Iterable[ArrayLike]) -> list[Plan]:
-        """A plan from each start."""
-        return [self.plan(start) for start in starts]
+        """A plan from each start, after one round of the search each where nothing is in the way."""
+        rounds = ROUNDS_OF_MANY * ROUND
+        planning = replace(self.scene.planning, iterations=min(self.scene.planning.iterations, rounds))
+        few = copy(self)
+        few.scene = self.scene if _crowded(self.scene) else replace(self.scene, planning=planning)
+        return [few.plan(start) for start in starts]
 
     def improving(self, start: ArrayLike | None = None) -> Iterator[Plan]:
         """Plans that get better, the first one at once; plan() is the last of them."""
@@ -167,16 +163,13 @@ class Planner:
             yield from self._searched(scene, singles[0][0])
 
     def _searched(self, scene: Scene, single: float) -> Iterator[tuple[float, Sequence[Leg], dict[str, Any]]]:
-        from .graph import query
         from .refine import improvements
 
         planning = scene.planning
-        seeds = query(self.tree, scene.start_pose, SEEDS) if self._tree else []
         search = improvements(
             self.fleet,
             scene.start_pose,
             scene.goal_pose,
-            [(way.pushes, way.poses) for way in seeds],
             robust=planning.robust,
             seed=planning.seed,
         )
@@ -184,7 +177,6 @@ class Planner:
         for done, refined in enumerate(search):
             found = {
                 "single_cost": single,
-                "graph_cost": seeds[0].cost if seeds else None,
                 "cost_before_refinement": refined.cost_before,
                 "replanning_cost": refined.replanning_cost,
                 "rounds": done,
@@ -204,23 +196,6 @@ class Planner:
                 return
 
     @cached_property
-    def tree(self) -> "Tree":
-        """The search tree towards the goal: read from its file or the cache, or built.
-
-        Its poses fill a square about the goal that holds the scene's start. The square grows by doubling, so that
-        near starts share a tree.
-        """
-        from .graph import pose_samples, stored_tree
-
-        scene = self.scene
-        region = 4 * float(np.max(self.fleet.radius))
-        while region < np.max(np.abs((scene.start_pose - scene.goal_pose)[:2])):
-            region *= 2
-        poses = pose_samples(SAMPLES, scene.goal_pose, region, scene.planning.seed)
-        file = None if isinstance(self._tree, bool) else self._tree
-        return stored_tree(self.fleet, poses, scene.goal_pose, file)
-
-    @cached_property
     def transits(self) -> Transits:
         return Transits(self.scene)
 
@@ -238,7 +213,7 @@ def plan(scene: Scene) -> Plan:
     Returns:
         a Plan; where there is none, status "no_plan" and the reason of each push.
     """
-    return Planner(moved_inside(scene), tree=False).plan()
+    return Planner(moved_inside(scene)).plan()
 
 
 def _crowded(scene: Scene) -> bool:

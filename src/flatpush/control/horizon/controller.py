@@ -123,7 +123,7 @@ class HorizonController(AbstractController[HorizonState]):
         planning = replace(
             scene.planning, friction_margin=max(RESERVE, scene.planning.friction_margin), iterations=1
         )
-        planner = Planner(replace(scene, planning=planning), tree=False)
+        planner = Planner(replace(scene, planning=planning))
         if not planner.usable:
             reasons = "; ".join(f"{name}: {why}" for name, why in planner.reasons.items())
             raise InputError(f"no push of this scene can be steered. {reasons}")
