@@ -102,6 +102,7 @@ def test_the_document_is_the_contracts() -> None:
         "flatpush",
         "status",
         "scene",
+        "scene_digest",
         "cost",
         "duration",
         "run",

@@ -92,14 +92,20 @@ def test_over_the_object():
 
 
 def test_a_transit_keeps_the_limits():
-    scene = scene_of(L_SHAPE, 2, "lift", speed=0.05, acceleration=0.2)
+    limits = {"speed": 0.05, "acceleration": 0.2, "travel_speed": 0.08, "travel_acceleration": 0.4}
+    scene = scene_of(L_SHAPE, 2, "lift", **limits)
     places = placements(scene)
     segment = Transits(scene).between(places[0], places[1]).segment(scene.pusher, np.array([0.1, 0.2, 1.0]))
     tips = np.array([transform(X, np.array([[0, 0.006], [0, -0.006]])) for X in segment.pusher])
     heights = np.broadcast_to(segment.height[:, None, None], (*tips.shape[:2], 1))
     way = np.concatenate([tips, heights], axis=2)
     speed = np.linalg.norm(np.diff(way, axis=0), axis=2).max(axis=1) / np.diff(segment.times)
-    assert speed.max() <= 0.05 * (1 + 1e-9)
+    lifted = np.maximum(segment.height[:-1], segment.height[1:]) > 0
+    assert 0.05 < speed[lifted].max() <= 0.08 * (1 + 1e-9)
+    assert speed[~lifted].max() <= 0.05 * (1 + 1e-9)
+    assert np.max(
+        np.abs(np.diff(segment.pusher[:, 2])) / np.diff(segment.times)
+    ) <= scene.pusher.turn_rate * (1 + 1e-9)
     assert segment.times[-1] == pytest.approx(
         Transits(scene).between(places[0], places[1]).duration(scene.pusher)
     )

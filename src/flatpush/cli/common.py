@@ -4,14 +4,18 @@ import json
 import math
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from .. import compiling
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..problem import Plan
+    from ..simulation import Claim
 
 
 def numbers(text: str | None, count: int, option: str) -> list[float] | None:
@@ -53,6 +57,24 @@ def cost_text(cost: float, kind: str) -> str:
     if kind == "time":
         return "<0.01 s" if 0 < cost < 0.005 else f"{cost:.2f} s"
     return "<0.1 mm" if 0 < cost < 0.00005 else f"{1000 * cost:.1f} mm"
+
+
+def tell_failed(failed: Sequence["Claim"]) -> None:
+    """Names the claims of a plan that do not hold, on standard error."""
+    for claim in failed:
+        typer.echo(
+            f"✗ {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True
+        )
+
+
+def warn_unverified(plan: "Plan") -> None:
+    """Warns of a plan that fails verification."""
+    from ..simulation import verify
+
+    failed = verify(plan).failed if plan.status == "solved" else ()
+    if failed:
+        names = ", ".join(claim.name for claim in failed[:3]) + (", …" if len(failed) > 3 else "")
+        typer.echo(f"warning: this plan fails verification ({names}); see flatpush verify", err=True)
 
 
 def print_json(value: Any) -> None:

@@ -15,13 +15,13 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
-    from ..documents import check_writable, load_scene, outline_note
+    from ..documents import check_outputs, load_scene, outline_note, scene_files
     from ..planning import describe, freedom
     from ..planning.description import turning_radii
 
     asked, note = load_scene(scene), outline_note(scene)
     if figure is not None:
-        check_writable(figure)
+        check_outputs(scene_files(scene), [figure])
     with telling("describing"):
         pushes = describe(asked)
     if figure is not None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .common import numbers, print_json
+from .common import numbers, print_json, tell_failed
 
 
 def command(
@@ -15,19 +15,31 @@ def command(
         str | None,
         typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),
     ] = None,
+    unverified: Annotated[
+        bool, typer.Option("--unverified", help="Write a plan that fails verification; the file says so.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> int:
-    """Write the pusher's timed poses of PLAN as CSV: t [s], x, y, z [m], yaw [rad], segment."""
-    from ..documents import export_csv, load_plan
+    """Verify PLAN and write the pusher's timed poses as CSV: t [s], x, y, z [m], yaw [rad], segment."""
+    from ..documents import check_outputs, export_csv, load_plan
+    from ..simulation import verify
 
     if file.suffix.lower() != ".csv":
         from ..errors import InputError
 
         raise InputError("export writes a .csv file", value=str(file))
     frame = numbers(base_frame, 4, "--base-frame")
-    rows = export_csv(load_plan(plan), file, None if frame is None else tuple(frame))
+    check_outputs([plan], [file])
+    loaded = load_plan(plan)
+    failed = verify(loaded).failed if loaded.status == "solved" else ()
+    tell_failed(failed)
+    if failed and not unverified:
+        typer.echo("the plan fails verification; nothing was written (--unverified writes it)", err=True)
+        return 4
+    why = ", ".join(claim.name for claim in failed)
+    rows = export_csv(loaded, file, None if frame is None else tuple(frame), unverified=why)
     if as_json:
-        print_json({"file": str(file), "rows": rows})
+        print_json({"file": str(file), "rows": rows, "verified": not failed})
     else:
         typer.echo(f"wrote {file}: {rows} poses")
     return 0

@@ -27,7 +27,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
-    from ..documents import check_writable, load_scene, plan_document, save_plan
+    from ..documents import check_outputs, load_scene, plan_document, save_plan, scene_files
     from ..simulation import verify
 
     overrides: dict[str, Any] = {
@@ -45,9 +45,7 @@ def command(
         },
     }
     asked = load_scene(scene, {key: value for key, value in overrides.items() if value})
-    for path in (output, figure, snapshots):
-        if path is not None:
-            check_writable(path)
+    check_outputs(scene_files(scene), [output, figure, snapshots])
     if figure is not None:
         from ..view import check_figure
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from .common import error_text, numbers, pose_text, print_json, telling
+from .common import error_text, numbers, pose_text, print_json, telling, warn_unverified
 
 
 def command(
@@ -47,7 +47,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Roll PLAN out in the quasi-static contact simulator."""
-    from ..documents import check_writable, load_plan
+    from ..documents import check_outputs, load_plan
     from ..problem.scene import MODELS
 
     if runs < 1:
@@ -60,9 +60,8 @@ def command(
         raise InputError("--source is arcs or samples", value=source)
     noise = _noise(position, angle, friction, friction_range, df, centre, loads, model)
     loaded = load_plan(plan)
-    for path in (output, figure):
-        if path is not None:
-            check_writable(path)
+    check_outputs([plan], [output, figure])
+    warn_unverified(loaded)
     if figure is not None:
         from ..view.figure import ENDINGS, check_ending
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from ..errors import InputError
-from .common import error_text, numbers, pose_text, print_json
+from .common import error_text, numbers, pose_text, print_json, warn_unverified
 
 if TYPE_CHECKING:
     from ..control import ClosedLoopRun, ControllerState
@@ -48,7 +48,7 @@ def command(
     """Follow PLAN under feedback, in the contact simulator with a simulated camera."""
     from ..control import Camera
     from ..control.tracking.simulated_run import TrackedRun, goal_error
-    from ..documents import check_writable, load_plan
+    from ..documents import check_outputs, load_plan
 
     if controller not in CONTROLLERS:
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
@@ -77,10 +77,11 @@ def command(
         seed,
     )
     loaded = load_plan(plan)
+    warn_unverified(loaded)
     if figure is not None:
         from ..view.figure import check_ending
 
-        check_writable(figure)
+        check_outputs([plan], [figure])
         check_ending(figure, (".svg", ".png"))
     run = asked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():

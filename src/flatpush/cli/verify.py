@@ -1,24 +1,28 @@
-"""flatpush verify: recomputes every claim of a plan."""
+"""flatpush verify: recomputes every claim of a plan and checks what a robot will execute."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .common import print_json, telling
+from .common import print_json, tell_failed, telling
 
 
 def command(
     plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
+    scene: Annotated[
+        Path | None, typer.Option(help="The scene that you trust; every difference from it is named.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> int:
     """Recompute every claim of PLAN from its scene; exit with 4 if one does not hold."""
-    from ..documents import load_plan
+    from ..documents import load_plan, load_scene
     from ..simulation import verify
 
     loaded = load_plan(plan)
+    trusted = None if scene is None else load_scene(scene)
     with telling("verifying"):
-        report = verify(loaded)
+        report = verify(loaded, trusted)
     if as_json:
         print_json(
             {
@@ -37,10 +41,7 @@ def command(
             }
         )
     else:
-        for claim in report.failed:
-            typer.echo(
-                f"✗ {claim.name}: stated {claim.stated}, found {claim.recomputed} ({claim.rule})", err=True
-            )
+        tell_failed(report.failed)
         good = len(report.claims) - len(report.failed)
         typer.echo(
             f"{good} of {len(report.claims)} claims hold: " + ("verified" if report.ok else "NOT verified")

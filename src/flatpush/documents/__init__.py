@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .atomic import check_writable, write_atomically
+    from .atomic import check_outputs, check_writable, write_atomically
     from .export import export_csv
     from .outline_reader import OutlineNote, outline_note, scene_files
     from .pairs_file import BadRow, PairsFile, load_pairs
@@ -28,6 +28,7 @@ __all__ = [
     "PairsFile",
     "RobotLog",
     "RobotRun",
+    "check_outputs",
     "check_writable",
     "export_csv",
     "load_pairs",
@@ -58,6 +59,7 @@ _HOME = {
     "PairsFile": "pairs_file",
     "RobotLog": "robot_log",
     "RobotRun": "robot_log",
+    "check_outputs": "atomic",
     "check_writable": "atomic",
     "export_csv": "export",
     "load_pairs": "pairs_file",

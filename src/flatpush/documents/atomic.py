@@ -1,6 +1,7 @@
 """Writes a file whole or not at all."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from uuid import uuid4
 
@@ -55,6 +56,41 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         raise _refusal(path, "no such folder")
     if not os.access(target if target.exists() and not target.is_file() else target.parent, os.W_OK):
         raise _refusal(path, "permission denied")
+
+
+def check_outputs(
+    inputs: Sequence[str | os.PathLike[str] | None], outputs: Sequence[str | os.PathLike[str] | None]
+) -> None:
+    """Refuses outputs that would take the place of an input or of each other, through links too; None is no file.
+
+    Raises:
+        InputError: for the first of them, and as check_writable.
+    """
+    taken = {_identity(path): "an input of this command" for path in inputs if path is not None}
+    for path in outputs:
+        if path is None:
+            continue
+        check_writable(path)
+        place = _identity(path)
+        if place in taken and place is not None:
+            raise InputError(
+                f"this file is {taken[place]} too; nothing was written",
+                source=os.fspath(path),
+                hint="Choose another place.",
+            )
+        taken[place] = "another output"
+
+
+def _identity(path: str | os.PathLike[str]) -> object:
+    """What two names of one file share; None for what is no file (a pipe, /dev/stdout)."""
+    real = Path(os.path.realpath(path))
+    if real.exists() and not real.is_file():
+        return None
+    try:
+        found = real.stat()
+        return found.st_dev, found.st_ino
+    except OSError:
+        return str(real)
 
 
 def _refusal(path: str | os.PathLike[str], reason: str) -> InputError:

@@ -14,7 +14,13 @@ from .atomic import write_atomically
 HEADER = "t [s],x [m],y [m],z [m],yaw [rad],segment"
 
 
-def export_csv(plan: Plan, path: str | os.PathLike[str], base_frame: Sequence[float] | None = None) -> int:
+def export_csv(
+    plan: Plan,
+    path: str | os.PathLike[str],
+    base_frame: Sequence[float] | None = None,
+    *,
+    unverified: str = "",
+) -> int:
     """Writes the poses of the pusher over time, one row each: t, x, y, z, yaw and the number of the segment.
 
     The pose is that of the frame E (midway between the fingertips, x along the push), its z the height of the
@@ -26,6 +32,7 @@ def export_csv(plan: Plan, path: str | os.PathLike[str], base_frame: Sequence[fl
         path: of the CSV file, which appears whole or not at all.
         base_frame: the pose (x, y, z, yaw) of the table frame W in the robot's base frame [m, rad]; W itself
             if None.
+        unverified: why the plan is not verified; it stands in a line before the header, after "# NOT VERIFIED".
 
     Returns:
         The number of rows.
@@ -40,7 +47,8 @@ def export_csv(plan: Plan, path: str | os.PathLike[str], base_frame: Sequence[fl
     if base.shape != (4,) or not np.isfinite(base).all():
         raise InputError("a base frame is four finite numbers, x,y,z,yaw in m and rad", value=base_frame)
     rows = _rows(plan, base)
-    write_atomically(path, "\n".join([HEADER, *rows]) + "\n")
+    warning = [f"# NOT VERIFIED: {' '.join(unverified.split())}"] if unverified else []
+    write_atomically(path, "\n".join([*warning, HEADER, *rows]) + "\n")
     return len(rows)
 
 
@@ -53,7 +61,8 @@ def _rows(plan: Plan, base: Array) -> list[str]:
         for t, (x, y, yaw), height in zip(segment.times + begin, poses, heights, strict=True):
             # A segment begins where and when the last one ended.
             if t - last > 1e-9:
-                rows.append(f"{t:.9f},{x:.9f},{y:.9f},{base[2] + height:.9f},{yaw:.9f},{number}")
+                # Rounded so finely that differences of rows keep the limits of speed and acceleration.
+                rows.append(f"{t:.12f},{x:.15f},{y:.15f},{base[2] + height:.15f},{yaw:.15f},{number}")
                 last = t
         begin += float(segment.times[-1])
     return rows

@@ -16,6 +16,7 @@ from .atomic import write_atomically
 from .plan_model import CertificatePart, NoCertificatePart, PlanModel, PushSegmentPart, TransitSegmentPart
 from .reading import join, plain, read_mapping
 from .refusals import checked
+from .scene_digest import scene_digest
 from .scene_reader import parse_scene
 from .scene_writer import scene_document
 
@@ -42,6 +43,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         document["reason"] = plan.reason
     return document | {
         "scene": scene_document(plan.scene),
+        "scene_digest": plan.scene_digest or scene_digest(plan.scene),
         "cost": None if plan.status == "no_plan" else _finite(plan.cost, "cost"),
         "duration": _finite(plan.duration, "duration"),
         "run": _open(plan.run),
@@ -90,6 +92,7 @@ def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:
         segments=tuple(_read_segment(s, join("segments", i), source) for i, s in enumerate(model.segments)),
         certificate=_read_certificate(model.certificate),
         reason=model.reason,
+        scene_digest=model.scene_digest,
         run=model.run,
     )
 

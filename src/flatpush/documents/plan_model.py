@@ -106,6 +106,7 @@ class PlanModel(Part):
     status: Literal["solved", "no_plan"] = Field(description="solved or no_plan.")
     reason: str = Field(default="", description="Why there is no plan, and what to try.")
     scene: dict[str, Any] = Field(description="The scene as resolved, in SI: a scene document.")
+    scene_digest: str = Field(default="", description="The SHA-256 of the scene; older plans have none.")
     cost: Finite | None = Field(description="In the unit of the scene's cost; null without a plan.")
     duration: Time = Field(description="Seconds.")
     run: dict[str, Any] = Field(default_factory=dict, description="Version and planning time; not compared.")

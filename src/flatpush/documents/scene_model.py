@@ -262,6 +262,9 @@ class PusherPart(Part):
     )
     transit: Literal["lift", "planar"] = Field(default="lift", description="Between pushes: lift or planar.")
     lift: Positive = unstated("The height of a lifted transit; 30 mm if left out.")
+    turn_rate: Positive = unstated("The greatest turn rate of the hand; 90°/s if left out.")
+    travel_speed: Positive = unstated("The greatest speed of a lifted fingertip; 100 mm/s if left out.")
+    travel_acceleration: Positive = unstated("Its greatest acceleration; 500 mm/s² if left out.")
 
 
 class PushAtPart(Part):

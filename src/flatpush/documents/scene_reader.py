@@ -19,6 +19,11 @@ from .reading import join, plain, read_mapping
 from .refusals import checked, nearest
 
 # A pose whose angle is more than two turns was written in degrees.
+# Keys of the pusher that are lengths, or lengths over time.
+LENGTHS = (
+    *("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"),
+    *("travel_speed", "travel_acceleration"),
+)
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
 
 
@@ -136,8 +141,10 @@ def _outline(ctx: Context, form: Any) -> Outline:
 
 def _pusher(ctx: Context, part: m.PusherPart) -> Pusher:
     given = {key: getattr(part, key) for key in part.model_fields_set}
-    for key in ("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"):
-        if key in given:
+    for key in given:
+        if key == "turn_rate":
+            given[key] = ctx.angle(given[key])
+        elif key in LENGTHS:
             given[key] = given[key] / ctx.per_metre
     with ctx.at("pusher"):
         return Pusher(**given)

@@ -39,6 +39,9 @@ pusher:
   turns: true                     # false: one finger that keeps its orientation and rolls along the object
   transit: lift                   # between pushes: lift, or planar (stays on the table)
   lift: 30                        # height of a lifted transit
+  turn_rate: 90                   # of the hand, per second
+  travel_speed: 100               # of the fastest fingertip while it is lifted
+  travel_acceleration: 500
 
 # Where to push: auto, or a list of places.
 pushes:

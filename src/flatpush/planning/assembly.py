@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .rolling import rolling_segment
 from .segments import arc_duration, arcs_of, fingertips, push_segment
 from .transits import Transits
 
+Segment = TypeVar("Segment", PushSegment, TransitSegment)
 Segments = tuple[PushSegment | TransitSegment, ...]
 # A word found again from where the last push really ended is the same if its amounts differ by less [rad, m].
 SAME = 1e-6
@@ -71,16 +73,25 @@ def assemble(scene: Scene, transits: Transits, legs: Sequence[Leg]) -> Segments:
         if hand is None:
             segments.append(transits.landing(there).segment(scene.pusher, pose))
         elif leg.option is not before or not scene.pusher.turns:
-            segments.append(transits.between(hand, there).segment(scene.pusher, pose))
+            way = transits.between(hand, there).segment(scene.pusher, pose)
+            segments.append(following(way, segments[-1]))
         push = _push(scene, leg, pose)
-        segments.append(push)
+        segments.append(following(push, segments[-1]))
         pose, before = push.object[-1], leg.option
         # Where the fingers now stand on the object; a finger that kept its direction has rolled along.
         stand = relative(pose, push.pusher[-1])
         hand = there if scene.pusher.turns else replace(there, pose=stand, tips=stand[None, :2])
     assert hand is not None
-    segments.append(transits.landing(hand).reversed().segment(scene.pusher, pose))
+    away = transits.landing(hand).reversed().segment(scene.pusher, pose)
+    segments.append(following(away, segments[-1]))
     return tuple(segments)
+
+
+def following(segment: Segment, before: PushSegment | TransitSegment) -> Segment:
+    """A segment with whole turns added to the pusher's yaw, so that it goes on from the segment before."""
+    turns = round(float(before.pusher[-1, 2] - segment.pusher[0, 2]) / (2 * np.pi))
+    whole = np.array([0.0, 0.0, 2 * np.pi * turns])
+    return segment if turns == 0 else replace(segment, pusher=segment.pusher + whole)
 
 
 def _push(scene: Scene, leg: Leg, start: Array) -> PushSegment:

@@ -25,7 +25,8 @@ def fleet_of(scene: Scene, options: Sequence[PushOption], transits: Transits) ->
         )
     pusher = scene.pusher
     radii = np.array([tip_radii(car_of(o), fingertips(o.push.fingers, o.push.spacing)) for o in options])
-    laws = [[Trapezoid.along(1.0, float(r), pusher.speed, pusher.acceleration) for r in row] for row in radii]
+    limits = pusher.speed, pusher.acceleration, pusher.turn_rate
+    laws = [[Trapezoid.along(1.0, float(r), *limits) for r in row] for row in radii]
     return Fleet.of(
         cars,
         np.where(np.isinf(radii), 1.0, radii),

@@ -64,7 +64,14 @@ def tip_radii(car: Car, fingers: Array) -> Array:
 
 def arc_duration(arc: ArcGeometry, pusher: Pusher) -> float:
     """Time of an arc from rest to rest [s]."""
-    return Trapezoid.along(arc.tip_length, arc.tip_radius, pusher.speed, pusher.acceleration).duration
+    return arc_law(arc, pusher).duration
+
+
+def arc_law(arc: ArcGeometry, pusher: Pusher) -> Trapezoid:
+    """The time law of an arc, whose hand turns with the object."""
+    return Trapezoid.along(
+        arc.tip_length, arc.tip_radius, pusher.speed, pusher.acceleration, pusher.turn_rate
+    )
 
 
 def push_segment(
@@ -76,7 +83,7 @@ def push_segment(
     times, poses, made = [np.zeros(1)], [np.asarray(start, dtype=float)[None]], []
     clock, X = 0.0, np.asarray(start, dtype=float)
     for arc in arcs:
-        law = Trapezoid.along(arc.tip_length, arc.tip_radius, pusher.speed, pusher.acceleration)
+        law = arc_law(arc, pusher)
         turn = abs(float(arc.step[2]))
         # The farthest point of the object from the turning centre bows and accelerates the most.
         reach = far + float(np.hypot(*arc.step[:2])) / turn if turn > 0 else far

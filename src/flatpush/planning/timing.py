@@ -16,13 +16,17 @@ class Trapezoid:
     acceleration: float
 
     @classmethod
-    def along(cls, length: float, radius: float, speed: float, acceleration: float) -> "Trapezoid":
-        """For the fastest fingertip on a circle of a radius (inf: a straight line).
+    def along(
+        cls, length: float, radius: float, speed: float, acceleration: float, turn_rate: float = np.inf
+    ) -> "Trapezoid":
+        """For the fastest fingertip on a circle of a radius (inf: a straight line), of a hand that turns with it.
 
         The cruising speed leaves half of the acceleration's square for turning, so that speeding up while turning
         keeps the whole within the limit.
         """
         cruise = min(speed, float(np.sqrt(acceleration * radius / np.sqrt(2.0))))
+        if not np.isinf(radius):
+            cruise = min(cruise, turn_rate * radius)
         return cls(length, cruise, acceleration if np.isinf(radius) else acceleration / float(np.sqrt(2.0)))
 
     @property

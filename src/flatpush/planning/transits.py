@@ -39,6 +39,8 @@ class Way:
         """Way of the fastest fingertip on each stretch, at most, shape (n - 1,) [m]."""
         step = np.diff(self.poses, axis=0)
         flat = np.hypot(step[:, 0], step[:, 1]) + np.abs(step[:, 2]) * self.reach
+        # A hand of one finger that only turns on its place: its turn counts as a way of 1 mm/rad.
+        flat = np.where(flat + np.abs(np.diff(self.heights)) > 0, flat, 1e-3 * np.abs(step[:, 2]))
         return np.hypot(flat, np.diff(self.heights))
 
     @property
@@ -49,12 +51,27 @@ class Way:
 
     def duration(self, pusher: Pusher) -> float:
         """Time from rest to rest on every stretch [s]."""
-        return float(
-            sum(
-                Trapezoid.along(float(n), np.inf, pusher.speed, pusher.acceleration).duration
-                for n in self.lengths
-            )
-        )
+        return float(sum(law.duration for law in self._laws(pusher)))
+
+    def _laws(self, pusher: Pusher) -> list[Trapezoid]:
+        """The time law of each stretch: on the table with speed and acceleration, lifted with those of travel.
+
+        A fingertip of a turning hand has, beside that of its way, an acceleration towards the middle of the hand,
+        which may have the same direction: each gets half of the limit.
+        """
+        laws = []
+        turns = np.abs(np.diff(self.poses[:, 2]))
+        lifted = np.maximum(self.heights[:-1], self.heights[1:]) > 0
+        for length, turn, up in zip(self.lengths, turns, lifted, strict=True):
+            speed = pusher.travel_speed if up else pusher.speed
+            most = pusher.travel_acceleration if up else pusher.acceleration
+            if turn > 0:
+                most = 0.5 * most
+                speed = min(speed, pusher.turn_rate * length / turn)
+                if self.reach > 0:
+                    speed = min(speed, float(np.sqrt(most / self.reach)) * length / turn)
+            laws.append(Trapezoid(float(length), float(speed), most))
+        return laws
 
     def reversed(self) -> "Way":
         return Way(self.poses[::-1].copy(), self.heights[::-1].copy(), self.reach)
@@ -63,12 +80,11 @@ class Way:
         """The way beside an object at a pose, timed."""
         times, poses, heights = [np.zeros(1)], [self.poses[:1]], [self.heights[:1]]
         clock = 0.0
-        for i, length in enumerate(self.lengths):
-            law = Trapezoid.along(float(length), np.inf, pusher.speed, pusher.acceleration)
+        for i, law in enumerate(self._laws(pusher)):
             turn = abs(float(self.poses[i + 1, 2] - self.poses[i, 2]))
-            steps = [np.sqrt(8 * SAG / pusher.acceleration)]
+            steps = [np.sqrt(8 * SAG / law.acceleration)]
             if turn > 0:
-                steps.append(np.sqrt(8 * SAG_ANGLE * float(length) / turn / pusher.acceleration))
+                steps.append(np.sqrt(8 * SAG_ANGLE * law.length / turn / law.acceleration))
             t, f = law.samples(float(min(steps)), 1)
             times.append(clock + t[1:])
             poses.append(self.poses[i] + f[1:, None] * (self.poses[i + 1] - self.poses[i]))

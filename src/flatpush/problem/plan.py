@@ -75,6 +75,7 @@ class Plan:
         segments: pushes and transits in order; empty when start and goal are equal.
         certificate: what was proved or measured; None without a plan.
         reason: why there is no plan, and what to try.
+        scene_digest: of the scene it was saved with, see documents.scene_digest; empty before that and in older plans.
         run: version and planning time; not part of what two plans are compared by.
     """
 
@@ -85,6 +86,7 @@ class Plan:
     segments: tuple[PushSegment | TransitSegment, ...] = ()
     certificate: Certificate | None = None
     reason: str = ""
+    scene_digest: str = ""
     run: Mapping[str, float | str | None] = field(default_factory=dict)
 
     @property

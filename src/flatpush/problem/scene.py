@@ -65,9 +65,16 @@ class Object:
         return self.support.centre
 
 
+SPEEDS = ("speed", "acceleration", "turn_rate", "travel_speed", "travel_acceleration")
+
+
 @dataclass(frozen=True)
 class Pusher:
-    """The fingers and how they may move. Lengths [m], speed [m/s] of the fastest fingertip, acceleration [m/s²]."""
+    """The fingers and how they may move.
+
+    Lengths [m]; speed [m/s] and acceleration [m/s²] of the fastest fingertip on the table, travel_speed and
+    travel_acceleration while it is lifted; turn_rate [rad/s] of the hand, always.
+    """
 
     fingers: int = 1
     spacing: float = 0.0
@@ -78,18 +85,25 @@ class Pusher:
     turns: bool = True
     transit: Literal["lift", "planar"] = "lift"
     lift: float = 0.03
+    turn_rate: float = float(np.deg2rad(90))
+    travel_speed: float = 0.1
+    travel_acceleration: float = 0.5
 
     def __post_init__(self) -> None:
         def need(good: bool, key: str, rule: str, hint: str = "") -> None:
             if not good:
                 raise InputError(rule, key=f"pusher.{key}", value=getattr(self, key), hint=hint)
 
-        for key in ("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"):
+        for key in ("spacing", "tip_radius", "approach", "lift", *SPEEDS):
             need(bool(np.isfinite(getattr(self, key))), key, "a finite number is needed")
         need(self.fingers in (1, 2), "fingers", "a pusher has 1 or 2 fingers")
         need(self.tip_radius >= 0, "tip_radius", "a tip radius is 0 or more")
-        need(self.speed > 0, "speed", "a speed is positive")
-        need(self.acceleration > 0, "acceleration", "an acceleration is positive")
+        for key in SPEEDS:
+            need(
+                getattr(self, key) > 0,
+                key,
+                f"{'an' if key[0] == 'a' else 'a'} {key.replace('_', ' ')} is positive",
+            )
         need(self.approach >= 0, "approach", "the approach distance is 0 or more")
         need(self.lift > 0, "lift", "the lift height is positive")
         if self.fingers == 2:

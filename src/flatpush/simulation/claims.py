@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact import PointContact, steering_forces
 from ..friction.surface import LimitSurface
-from ..geometry import compose, exp, log, pose_error, relative, rotate, shift_twist, transform, velocity_at
+from ..geometry import compose, exp, log, pose_error, relative, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
 from ..problem import CarCentres, Certificate, PushSegment, Scene, TransitSegment
 from ..problem.mechanics import (
@@ -23,7 +23,7 @@ from ..problem.mechanics import (
 from .clearance import clearance_of
 from .cone_margins import cone_margins
 from .margins import Margins, contact_margins, two_finger_margins, worse_of
-from .pieces import pieces, progress, turns_along
+from .pieces import progress, turns_along
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
 TRUSTED_GROWTH = float(np.exp(4.0))
@@ -186,83 +186,3 @@ def _warnings(growth: float | None, worst: Margins) -> list[str]:
             f" {1000 * worst.offset:.2f} mm, so the object will drift from the plan"
         )
     return found
-
-
-def sample_errors(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> dict[str, float]:
-    """How well the samples agree with the arcs, the fingers with the outline, and the motion with its limits.
-
-    Returns:
-        start: distance of the first pose from the start, and of each push's from where the last one ended.
-        path: largest distance of an object sample from its arcs [m or rad].
-        fingers: largest error of the fingertips' place on the outline [m].
-        jump: largest jump of the pusher between segments [m or rad].
-        transit: deepest overlap of a fingertip with the resting object while the pusher moves on the table [m].
-        speed: largest mean speed of a fingertip between samples, over the limit.
-        clock: largest step back in time [s].
-    """
-    errors = dict.fromkeys(("start", "path", "fingers", "jump", "transit", "speed", "clock"), 0.0)
-    pose = np.asarray(scene.start, dtype=float)
-    hand: Array | None = None
-    limits = scene.pusher
-    for k, segment in enumerate(segments):
-        if isinstance(segment, PushSegment):
-            placement = placement_of(scene, named(scene, segment.push))
-            errors["start"] = max(errors["start"], _most(segment.object[0], pose))
-            tips = transform(placement.pose, segment.fingers)
-            errors["fingers"] = max(errors["fingers"], float(np.max(np.abs(tips - placement.tips))))
-            if turns_along(segment):
-                on = np.array([relative(o, p) for o, p in zip(segment.object, segment.pusher, strict=True)])
-                errors["fingers"] = max(errors["fingers"], float(np.max(_differences(on, placement.pose))))
-            else:
-                gaps = [
-                    scene.object.outline.nearest(relative(o, p)[:2]).distance - limits.tip_radius
-                    for o, p in zip(segment.object, segment.pusher, strict=True)
-                ]
-                errors["fingers"] = max(errors["fingers"], float(np.max(np.abs(gaps))))
-            if turns_along(segment):
-                for piece, end in zip(pieces([segment], segment.object[0]), segment.object[1:], strict=True):
-                    errors["path"] = max(errors["path"], _most(piece.object_at(1.0), end))
-            for arc in segment.arcs:
-                pose = compose(pose, exp(arc.duration * arc.twist))
-            errors["path"] = max(errors["path"], _most(segment.object[-1], pose))
-            speeds = _tip_speeds(segment.times, segment.pusher, segment.fingers)
-        else:
-            around = next(
-                (s for s in [*reversed(segments[:k]), *segments[k:]] if isinstance(s, PushSegment)), None
-            )
-            tips = np.zeros((1, 2)) if around is None else around.fingers
-            speeds = _tip_speeds(segment.times, segment.pusher, tips)
-            errors["transit"] = max(errors["transit"], _overlap(scene, segment, pose, tips))
-        errors["speed"] = max(errors["speed"], float(np.max(speeds, initial=0.0)) / limits.speed)
-        errors["clock"] = max(errors["clock"], float(np.max(-np.diff(segment.times), initial=0.0)))
-        if hand is not None:
-            errors["jump"] = max(errors["jump"], _most(segment.pusher[0], hand))
-        hand = segment.pusher[-1]
-    return errors
-
-
-def _overlap(scene: Scene, segment: TransitSegment, pose: Array, fingers: Array) -> float:
-    """How deep a fingertip on the table gets into the object, at most [m]."""
-    outline, radius = scene.object.outline, scene.pusher.tip_radius
-    low = segment.height <= 0
-    tips = [transform(relative(pose, X), fingers) for X in segment.pusher[low]]
-    return (
-        max((radius - outline.nearest(tip).distance for tip in np.concatenate(tips)), default=0.0)
-        if tips
-        else 0.0
-    )
-
-
-def _most(a: Array, b: Array) -> float:
-    return float(np.max(np.abs(pose_error(a, b))))
-
-
-def _differences(poses: Array, target: Array) -> Array:
-    return np.abs(pose_error(poses, target))
-
-
-def _tip_speeds(times: Array, pusher: Array, fingers: Array) -> Array:
-    dt = np.diff(times)
-    tips = np.stack([transform(X, fingers) for X in pusher])
-    moved = np.linalg.norm(np.diff(tips, axis=0), axis=-1).max(axis=-1)
-    return np.where(dt > 0, moved / np.where(dt > 0, dt, 1.0), np.where(moved > 1e-12, np.inf, 0.0))

@@ -68,7 +68,9 @@ class _Motion:
             for name in ("object", "object_step", "pusher", "pusher_step")
         )
         self.body = np.array([piece.body for piece in listed])
-        self.lifted = np.array([piece.lifted for piece in listed])
+        # On its way up and down the pusher is among the obstacles still.
+        lift = scene.pusher.lift * (1 - 1e-9)
+        self.lifted = np.array([piece.lifted and piece.height >= lift for piece in listed])
         self.hand = np.array(held)
         # The most that any point of object or fingertips moves in each piece [m].
         tips = np.max(np.linalg.norm(self.hand, axis=2), axis=1) + scene.pusher.tip_radius

@@ -25,6 +25,7 @@ class Piece:
         body: whether the steps are body twists (exact arcs), or straight steps (x, y, θ) in W.
         push: index of the segment's push, or None in a transit.
         lifted: whether the pusher is off the table during all or part of it.
+        height: the least height of the fingertips in it [m].
     """
 
     time: float
@@ -36,6 +37,7 @@ class Piece:
     body: bool
     push: int | None
     lifted: bool
+    height: float = 0.0
 
     def object_at(self, fraction: float) -> Array:
         """X_WO as planned, at a fraction of the piece."""
@@ -85,6 +87,7 @@ def pieces(
                     False,
                     None,
                     lifted,
+                    float(min(segment.height[i], segment.height[i + 1])),
                 )
         else:
             push += 1

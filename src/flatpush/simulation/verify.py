@@ -1,4 +1,4 @@
-"""Recomputes every claim of a plan from its scene."""
+"""Recomputes every claim of a plan from its scene, and checks what a robot will execute."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..documents.scene_digest import SceneDifference, scene_differences, scene_digest
 from ..errors import FlatpushError, InputError
-from ..problem import Certificate, Plan
-from .claims import arc_costs, certify, sample_errors
+from ..problem import Certificate, Plan, Scene
+from .claims import arc_costs, certify
+from .execution import Finding, execution_findings
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
-# Samples may round to the plan document's digits, and speeds to the sampling of a smooth profile.
-SAMPLES, SPEED = 1e-9, 1.0 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,30 @@ class Report:
         return tuple(claim for claim in self.claims if not claim.ok)
 
 
-def verify(plan: Plan) -> Report:
+def verify(plan: Plan, scene: Scene | None = None) -> Report:
     """Recomputes every claim of a plan from its scene and checks what every plan must keep.
+
+    Args:
+        scene: the scene that is trusted; every difference of the plan's own scene from it is a claim that fails.
+            Default: the plan's scene is believed.
 
     Raises:
         InputError: for a document that holds no plan.
     """
     if plan.status != "solved":
         raise InputError("there is no plan to verify", hint=plan.reason)
+    trusted = [] if scene is None else [_difference(d) for d in scene_differences(plan.scene, scene)]
     try:
+        findings = execution_findings(plan.scene, plan.segments)
+        if any(not s.arcs for s in plan.pushes):
+            return Report((*trusted, *(_executed(finding) for finding in findings)))
         computed = certify(plan.scene, plan.segments)
-        errors = sample_errors(plan.scene, plan.segments)
     except FlatpushError as error:
-        return Report(
-            (Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense"),)
-        )
+        wrong = Claim("mechanics", "a plan for its scene", str(error), 0.0, False, "must make sense")
+        return Report((*trusted, wrong))
     claims = [
+        *trusted,
+        *_same_scene(plan),
         _stated("cost", plan.cost, computed.cost),
         _stated("duration", plan.duration, computed.duration),
     ]
@@ -95,10 +103,27 @@ def verify(plan: Plan) -> Report:
         claims.append(
             Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required")
         )
-    for key, value in errors.items():
-        limit = SPEED if key == "speed" else SAMPLES
-        claims.append(Claim(f"samples: {key}", None, value, limit, bool(value <= limit), "consistent"))
-    return Report(tuple(claims))
+    return Report((*claims, *(_executed(finding) for finding in findings)))
+
+
+def _executed(finding: Finding) -> Claim:
+    limit = f"at most {finding.limit:.6g} {finding.unit}".strip()
+    rule = limit if finding.ok else f"{finding.where}: {finding.value:.6g} {finding.unit}, {limit}"
+    return Claim(f"executed: {finding.name}", None, finding.value, finding.limit, finding.ok, rule)
+
+
+def _difference(difference: SceneDifference) -> Claim:
+    key, found, wanted = difference
+    return Claim(f"scene: {key}", found, wanted, 0.0, False, "as in the trusted scene")
+
+
+def _same_scene(plan: Plan) -> list[Claim]:
+    """That the scene is the one the plan was saved with; older plans do not say."""
+    if not plan.scene_digest:
+        return []
+    digest = scene_digest(plan.scene)
+    same = digest == plan.scene_digest
+    return [Claim("scene_digest", plan.scene_digest, digest, 0.0, same, "the scene it was planned for")]
 
 
 def _certified(stated: Certificate | None, computed: Certificate) -> list[Claim]:
