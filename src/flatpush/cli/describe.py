@@ -2,11 +2,14 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .common import print_json, telling
+
+if TYPE_CHECKING:
+    from ..planning import PushDescription
 
 
 def command(
@@ -47,7 +50,7 @@ def command(
     return 0
 
 
-def _push(described: Any, radii: dict[str, float]) -> dict[str, Any]:
+def _push(described: "PushDescription", radii: dict[str, float]) -> dict[str, Any]:
     car = described.option.car
     found: dict[str, Any] = {
         "name": described.push.name,

@@ -6,7 +6,11 @@ import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
 
 STYLE = {
     "font.size": 9.5,
@@ -44,18 +48,20 @@ def drawing_style() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float = 8.0, height: float = 16 / 3) -> Any:
+def new_figure(width: float = 8.0, height: float = 16 / 3) -> "Figure":
     """An empty figure with the Agg canvas and constrained layout; inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure: Any = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    figure = Figure(
+        figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08), facecolor="white"
+    )
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.08)
     return figure
 
 
-def figure_bytes(figure: Any, extension: str, title: str) -> bytes:
+def figure_bytes(figure: "Figure", extension: str, title: str) -> bytes:
     """The figure as ".png" or ".svg" (as wide as its page allows)."""
     buffer = io.BytesIO()
     if extension == ".png":
@@ -66,8 +72,10 @@ def figure_bytes(figure: Any, extension: str, title: str) -> bytes:
     return re.sub(r'(<svg [^>]*?)height="[^"]*" ', r"\1", _full_width(text), count=1).encode("utf-8")
 
 
-def headline(figure: Any, title: str, subtitle: str) -> None:
+def headline(figure: "Figure", title: str, subtitle: str) -> None:
     """Bold and plain lines above the drawing, flush left, in space kept for them; long ones are wrapped."""
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     width, height = figure.get_size_inches()
     below, left = 0.11, 0.12 / width
     for text, size, room, step, ink in ((title, 11.5, 9.5, 0.23, INK), (subtitle, 9.5, 13.0, 0.19, SOFT)):
@@ -75,10 +83,12 @@ def headline(figure: Any, title: str, subtitle: str) -> None:
             weight = "bold" if ink == INK else "normal"
             figure.text(left, 1 - below / height, line, va="top", fontsize=size, color=ink, weight=weight)
             below += step
-    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - (below - 0.01) / height))
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)
+    engine.set(rect=(0, 0, 1, 1 - (below - 0.01) / height))
 
 
-def legend_below(figure: Any, entries: Sequence[Any]) -> None:
+def legend_below(figure: "Figure", entries: Sequence["Artist"]) -> None:
     """A legend under the drawing in as many columns as fit, at most four."""
     for columns in (4, 3, 2, 1):
         legend = figure.legend(handles=entries, loc="outside lower left", ncols=columns)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,15 @@ from ..geometry.pose import Array
 from ..problem import Plan, PushSegment, Rollout, Scene
 from . import palette
 from .timeline import Timeline, arc_starts
-from .trace import PushTrace, fingertips, orientation_mark, rollout_paths, trace_pushes, turning_centre
+from .trace import (
+    PushTrace,
+    fingers_at,
+    fingertips,
+    orientation_mark,
+    rollout_paths,
+    trace_pushes,
+    turning_centre,
+)
 from .words import plan_subtitle, plan_title, push_label
 
 MM = 1e3
@@ -47,24 +54,15 @@ def _view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollou
     return tuple(float(v) for v in view_box(plan, traces, rollouts))
 
 
-def _data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, Any]:
+def _data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
     """What the script needs: samples of poses (mm, rad; y up), and the segments with their turns."""
     timeline = Timeline.of(plan)
-    segments: list[dict[str, Any]] = []
+    segments: list[dict[str, object]] = []
     pushes = iter(traces)
-    for start, segment in zip(timeline.starts, plan.segments, strict=True):
-        if isinstance(segment, PushSegment):
-            segments.append(_push(next(pushes), start))
-        else:
-            segments.append({"start": round(start, 6), "push": None})
-    # The pusher that moves alone shows the tips of the push it goes to, at the end those of the last push.
-    tips: list[list[float]] = []
-    for row in (*reversed(segments), *segments):
-        tips = row.setdefault("tips", tips)
-        if not tips:
-            del row["tips"]
-    for row in segments:
-        row["tips"] = row.get("tips", [])
+    for number, (start, segment) in enumerate(zip(timeline.starts, plan.segments, strict=True)):
+        row = _push(next(pushes), start) if isinstance(segment, PushSegment) else {"push": None}
+        tips = _round(MM * fingers_at(plan, number), 4)
+        segments.append({"start": round(start, 6), **row, "tips": tips})
     return {
         "times": _round(timeline.times, 6),
         "object": _round(timeline.object * [MM, MM, 1.0], 5),
@@ -75,7 +73,7 @@ def _data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, Any]:
     }
 
 
-def _push(trace: PushTrace, start: float) -> dict[str, Any]:
+def _push(trace: PushTrace, start: float) -> dict[str, object]:
     turns, end = [], start
     for arc, pose in zip(trace.segment.arcs, arc_starts(trace.segment), strict=False):
         end += arc.duration
@@ -83,11 +81,9 @@ def _push(trace: PushTrace, start: float) -> dict[str, Any]:
         where = None if centre is None else _round(MM * transform(pose, centre), 3)
         turns.append({"turn": arc.turn, "end": round(end, 6), "centre": where})
     return {
-        "start": round(start, 6),
         "push": trace.segment.push,
         "number": trace.number + 1,
         "colour": palette.push_colour(trace.number),
-        "tips": _round(MM * trace.segment.fingers, 4),
         "flat": None if trace.flat_point is None else _round(MM * trace.flat_point, 4),
         "turns": turns,
     }
@@ -201,5 +197,5 @@ def _number(value: float) -> str:
     return f"{value + 0.0:g}".replace("-", "−")
 
 
-def _round(values: Array, digits: int) -> Any:
+def _round(values: Array, digits: int) -> list[object]:
     return np.round(np.asarray(values, dtype=float) + 0.0, digits).tolist()

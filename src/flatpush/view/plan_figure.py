@@ -45,11 +45,15 @@ def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | No
     traces = trace_pushes(plan)
     title, subtitle = words.plan_title(plan), words.plan_subtitle(plan)
     box = view_box(plan, traces, rollouts)
-    frame = frame_for(box, EDGE + LEFT, title_height(title, subtitle), PAGE - LEFT - 2 * EDGE, 110.0, 330.0)
     entries = _legend(plan, traces, bool(rollouts), tree)
-    side = PAGE - EDGE - frame[2] - 16.0
-    beside = side > max((e.width for e in entries), default=0.0)  # a high picture leaves room at its right
-    width = side if beside else PAGE - 2 * EDGE
+    top, full = title_height(title, subtitle), PAGE - LEFT - 2 * EDGE
+    frame = frame_for(box, EDGE + LEFT, top, full, 110.0, 330.0)
+    width = PAGE - 2 * EDGE
+    # A picture that is too high to be as wide as the page has its legend at its right instead of an empty margin.
+    beside = bool(entries) and frame[2] - frame[0] < 0.9 * full
+    if beside:
+        width = max(entry.width for entry in entries)
+        frame = frame_for(box, EDGE + LEFT, top, full - width - 16.0, 110.0, 380.0)
     below = frame[3] + BOTTOM + 4
     strip = below if beside else below + legend_height(entries, width) + 6
     page = Drawing(PAGE, strip + _strip_height(len(traces)) + EDGE, title)

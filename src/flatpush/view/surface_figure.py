@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,11 @@ from ..geometry.pose import Array
 from . import palette
 from .canvas import INK, SOFT, drawing_style, figure_bytes, headline, legend_below, new_figure
 from .figure import check_ending
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d import Axes3D
 
 ENDINGS = (".svg", ".png")
 COLOURS = {"ellipsoid": palette.PUSHES[1], "quartic": palette.GOAL, "loads": palette.PUSHES[0]}
@@ -86,7 +91,7 @@ def _reach(surfaces: Mapping[str, tuple[LimitSurface, float]], pairs: Pairs, len
     return 1.4 * max(float(np.percentile(np.abs(F), 97)), *map(float, sizes))
 
 
-def _draw_space(axes: Any, surface: LimitSurface, size: float, pairs: Pairs, length: float) -> None:
+def _draw_space(axes: "Axes3D", surface: LimitSurface, size: float, pairs: Pairs, length: float) -> None:
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
@@ -126,7 +131,7 @@ def _draw_space(axes: Any, surface: LimitSurface, size: float, pairs: Pairs, len
 
 
 def _draw_section(
-    axes: Any,
+    axes: "Axes",
     surfaces: Mapping[str, tuple[LimitSurface, float]],
     pairs: Pairs,
     length: float,
@@ -158,7 +163,7 @@ def _draw_section(
         axes.spines[side].set_visible(False)
 
 
-def _legend(figure: Any, surfaces: Mapping[str, tuple[LimitSurface, float]]) -> None:
+def _legend(figure: "Figure", surfaces: Mapping[str, tuple[LimitSurface, float]]) -> None:
     from matplotlib.lines import Line2D
 
     entries = [
@@ -180,7 +185,6 @@ def _legend(figure: Any, surfaces: Mapping[str, tuple[LimitSurface, float]]) -> 
     legend_below(figure, entries)
 
 
-_DATA = "measured wrench (sections: within 20°)"
 _LABELS = {
     "ellipsoid": "ellipsoid",
     "quartic": "convex quartic",
