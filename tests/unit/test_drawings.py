@@ -9,7 +9,7 @@ import yaml
 
 from flatpush.documents import load_scene
 from flatpush.errors import InputError
-from flatpush.geometry import Outline
+from flatpush.geometry import Outline, cross
 
 FOLDER = Path(__file__).parents[1] / "data" / "drawings"
 CASES = yaml.safe_load((FOLDER / "cases.yaml").read_text(encoding="utf-8"))
@@ -67,3 +67,188 @@ def test_there_are_enough() -> None:
     on_disk = {path.name for path in FOLDER.iterdir()} - {"cases.yaml"}
     assert on_disk >= {case["file"] for case in CASES}
     assert len(CASES) >= 60
+
+
+@pytest.mark.parametrize(
+    ("name", "area", "sides"),
+    [
+        # An L of 60 × 20 and 20 × 20 with two corners rounded by 5, turned by 90° by its group.
+        ("bracket", 1600 - 2 * (1 - np.pi / 4) * 25, (40, 60)),
+        # A plate of 80 × 50 without a triangle of 60 × 20, three corners rounded by 10.
+        ("workshop", 4000 - 600 - 3 * (1 - np.pi / 4) * 100, (80, 50)),
+    ],
+)
+def test_newcomers_need_six_lines(name: str, area: float, sides: tuple[float, float]) -> None:
+    """A bracket on an A4 page with layers, and a workshop drawing with centre lines, dimension and title block."""
+    path = FOLDER / "newcomers" / f"{name}.yaml"
+    if name == "workshop":
+        pytest.importorskip("ezdxf")
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 6
+    outline = load_scene(path).object.outline
+    assert 1e6 * outline.area == pytest.approx(area, rel=8 * FLATNESS)
+    np.testing.assert_allclose(1e3 * np.ptp(outline.vertices, axis=0), sides, rtol=4 * FLATNESS)
+    np.testing.assert_allclose(outline.centroid, 0.0, atol=1e-15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bracket", "workshop"])
+def test_newcomers_get_a_plan(name: str) -> None:
+    import flatpush as fp
+
+    if name == "workshop":
+        pytest.importorskip("ezdxf")
+    changes = {"planning": {"iterations": 50, "time_limit": 120}}
+    plan = fp.plan(load_scene(FOLDER / "newcomers" / f"{name}.yaml", changes))
+    assert plan.status == "solved"
+    assert fp.verify(plan).ok
+
+
+def ellipse(tilt: float, rows: int = 300, columns: int = 340) -> np.ndarray:
+    """A mask of a tilted ellipse with half axes of 100 and 60 pixels, about the middle of the picture."""
+    y, x = np.mgrid[:rows, :columns] + 0.5
+    x, y = x - columns / 2, rows / 2 - y
+    u, v = x * np.cos(tilt) + y * np.sin(tilt), y * np.cos(tilt) - x * np.sin(tilt)
+    return (u / 100) ** 2 + (v / 60) ** 2 <= 1
+
+
+def off_ellipse(points: np.ndarray, tilt: float) -> float:
+    """The largest distance of points from that ellipse about the origin, to first order [pixels]."""
+    x, y = points.T
+    u, v = x * np.cos(tilt) + y * np.sin(tilt), y * np.cos(tilt) - x * np.sin(tilt)
+    value = (u / 100) ** 2 + (v / 60) ** 2 - 1
+    return float(np.max(np.abs(value) / (2 * np.hypot(u / 100**2, v / 60**2))))
+
+
+def bitmap_scene(folder: Path, pixels: np.ndarray, **outline: Any) -> Path:
+    from PIL import Image
+
+    Image.fromarray(pixels).save(folder / "mask.png")
+    path = scene(folder, {"file": "mask.png"})
+    document = yaml.safe_load(path.read_text())
+    document["object"]["outline"] = {"file": "mask.png", "pixel": 0.5, **outline}
+    path.write_text(yaml.safe_dump(document))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["mask", "photograph", "transparent"])
+def test_a_bitmap_gives_the_smooth_shape(tmp_path: Path, kind: str) -> None:
+    tilt = 0.4
+    inside = ellipse(tilt)
+    if kind == "mask":
+        pixels = np.where(inside, 255, 0).astype(np.uint8)
+    elif kind == "photograph":  # dark on light, uneven, with a speck of dirt and a bright spot on the object
+        rng = np.random.default_rng(1)
+        pixels = (np.where(inside, 60, 200) + rng.normal(0, 4, inside.shape)).astype(np.uint8)
+        pixels[20:23, 20:23] = 60
+        pixels[145:155, 160:175] = 200
+    else:
+        pixels = np.zeros((*inside.shape, 4), dtype=np.uint8)
+        pixels[..., 3] = np.where(inside, 255, 0)
+    path = bitmap_scene(tmp_path, pixels, origin=[85, -75])
+    outline = load_scene(path).object.outline
+    assert len(outline.vertices) < 150
+    assert off_ellipse(outline.vertices / 0.5e-3, tilt) < 1.0
+    assert outline.area == pytest.approx(np.pi * 100 * 60 * 0.5e-3**2, rel=5e-3)
+    from flatpush.documents import outline_note
+
+    note = outline_note(path)
+    assert note is not None
+    assert "within 0.5 mm" in note.lines[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("two", "2 objects, not one"),
+        ("edge", "touches the edge"),
+        ("empty", "shows no object"),
+        ("uneven", "background of the bitmap is not plain"),
+    ],
+)
+def test_bad_bitmaps(tmp_path: Path, change: str, words: str) -> None:
+    pixels = np.where(ellipse(0.0), 255, 0).astype(np.uint8)
+    if change == "two":
+        pixels[:40, 10:40] = pixels[250:290, 10:40] = 0
+        pixels[10:40, 10:40] = 255
+    elif change == "edge":
+        pixels[:160, 160] = 255
+    elif change == "empty":
+        pixels[:] = 0
+    else:
+        pixels[:, :] = np.linspace(0, 255, pixels.shape[1]).astype(np.uint8)
+    with pytest.raises(InputError, match=words) as caught:
+        load_scene(bitmap_scene(tmp_path, pixels))
+    assert "mask.png" in str(caught.value)
+
+
+def test_what_is_no_bitmap_and_a_missing_pixel_are_refused(tmp_path: Path) -> None:
+    path = bitmap_scene(tmp_path, np.where(ellipse(0.0), 255, 0).astype(np.uint8))
+    (tmp_path / "mask.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"no picture")
+    with pytest.raises(InputError, match="not a bitmap"):
+        load_scene(path)
+    path.write_text(path.read_text().replace("pixel: 0.5", "turn: 0"))
+    with pytest.raises(InputError, match="needs the side of a pixel"):
+        load_scene(path)
+
+
+def steps(mask: np.ndarray) -> np.ndarray:
+    """The outline of a mask along the sides of its pixels: a walk with the inside to its left."""
+    padded = np.pad(mask, 1).astype(int)
+    ends: dict[tuple[int, int], tuple[int, int]] = {}
+    for r, c in np.argwhere(padded):
+        x, y = int(c), -int(r)  # the upper left corner of the pixel, y up
+        for (dr, dc), start, end in (
+            ((1, 0), (x, y - 1), (x + 1, y - 1)),
+            ((0, 1), (x + 1, y - 1), (x + 1, y)),
+            ((-1, 0), (x + 1, y), (x, y)),
+            ((0, -1), (x, y), (x, y - 1)),
+        ):
+            if not padded[r + dr, c + dc]:
+                ends[start] = end
+    first = here = next(iter(ends))
+    walk = []
+    while True:
+        walk.append(here)
+        here = ends[here]
+        if here == first:
+            break
+    corners = np.array(walk)
+    turns = cross(np.roll(corners, -1, axis=0) - corners, corners - np.roll(corners, 1, axis=0))
+    return corners[turns != 0]
+
+
+def test_an_outline_of_pixel_steps_is_made_smooth(tmp_path: Path) -> None:
+    """Hundreds of steps took 86 s and then had no push; now they are the ellipse that they were drawn from."""
+    from flatpush.documents import outline_note
+
+    tilt = 0.4
+    corners = 0.5 * steps(ellipse(tilt))
+    assert len(corners) > 300
+    path = scene(tmp_path, {"file": "none.svg"})
+    document = yaml.safe_load(path.read_text())
+    document["object"]["outline"] = corners.tolist()
+    path.write_text(yaml.safe_dump(document))
+    outline = load_scene(path).object.outline
+    assert len(outline.vertices) < 150
+    assert off_ellipse((outline.vertices - outline.centroid) / 0.5e-3, tilt) < 1.0
+    note = outline_note(path)
+    assert note is not None
+    assert "corners of pixels, made smooth within 0.5 mm" in note.lines[0]
+
+
+def test_a_rack_is_not_an_outline_of_pixels() -> None:
+    """Teeth run along the axes in equal steps too, but turn twice the same way."""
+    from flatpush.documents.bitmap import without_steps
+
+    teeth = [(x, y) for k in range(50) for x, y in ((2 * k, 0), (2 * k, 1), (2 * k + 1, 1), (2 * k + 1, 0))]
+    assert without_steps(np.array([*teeth, (99.0, -5.0), (0.0, -5.0)])) is None
+
+
+def test_a_scene_tells_which_files_it_refers_to(tmp_path: Path) -> None:
+    from flatpush.documents import scene_files
+
+    path = scene(tmp_path, {"file": "use.svg"})
+    document = yaml.safe_load(path.read_text())
+    document["object"]["surface"] = {"file": "surface.json"}
+    path.write_text(yaml.safe_dump(document))
+    assert scene_files(path) == (path, FOLDER / "use.svg", tmp_path / "surface.json")

@@ -29,7 +29,7 @@ def read_bitmap(path: str | os.PathLike[str]) -> tuple[Array, str, list[LeftOut]
     """
     source = os.fspath(path)
     contrast = _contrast(path, source)
-    inside = contrast > _threshold(contrast)
+    inside = contrast > _threshold(contrast) if np.ptp(contrast) > 0 else np.zeros(contrast.shape, dtype=bool)
     border = np.concatenate([inside[0], inside[-1], inside[:, 0], inside[:, -1]])
     if not inside.any() or inside.all():
         raise InputError("the bitmap shows no object", source=source, hint=_HINT)
@@ -151,4 +151,4 @@ def _threshold(values: Array) -> float:
     sums = np.cumsum(counts * middles)
     with np.errstate(invalid="ignore", divide="ignore"):
         between = below * above * (sums / below - (sums[-1] - sums) / above) ** 2
-    return float(limits[1:][int(np.nanargmax(between[:-1]))]) if len(values) else 0.0
+    return float(limits[1:][int(np.nanargmax(between[:-1]))])
