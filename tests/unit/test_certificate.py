@@ -1,0 +1,187 @@
+"""The numbers of the certificate, each computed another way: closed forms, or brute force over forces."""
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.contact import PointContact, composite_margin, spacing_margin, two_point_sticks
+from flatpush.friction import Ellipsoid
+from flatpush.geometry import exp, shift_twist, velocity_at
+from flatpush.simulation import certify
+from flatpush.simulation.claims import TRUSTED_GROWTH
+from flatpush.simulation.cone_margins import cone_margins
+from flatpush.simulation.margins import Margins, worse_of
+
+MU, R, A, B = 0.4, 0.0175, 1.0, 1 / 2e-4  # an ellipsoid diag(a, a, b) about the COF, pushed from a distance R
+BLOCK = [(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)]
+
+
+def one_finger(margin, start=(0.01, -0.12, 0.3), **planning):
+    thing = fp.Object(BLOCK, friction=MU, surface=Ellipsoid(np.diag([A, A, B])))
+    pushes = (fp.Push("below", thing.outline.at(0, 0.5)),)
+    settings = fp.Planning(friction_margin=margin, iterations=1, **planning)
+    return fp.plan(fp.Scene(thing, start, pushes=pushes, planning=settings))
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.2, 0.37])
+def test_the_friction_margin_is_one_less_tangent_over_mu(margin):
+    """By the forces of the twists: V = A F, so that F = (vx, vy, ω a/b) / a; no function of contact is asked."""
+    plan = one_finger(margin)
+    tangents = []
+    for arc in plan.pushes[0].arcs:
+        v = shift_twist(arc.twist, plan.scene.object.cof)
+        tangents.append(abs(v[0] / v[1]))
+    assert plan.certificate.friction_margin == pytest.approx(1 - max(tangents) / MU, abs=1e-12)
+    assert plan.certificate.friction_margin == pytest.approx(margin, abs=1e-12)
+    degrees = np.degrees(np.arctan(MU) - np.arctan(max(tangents)))
+    assert plan.certificate.friction_margin_degrees == pytest.approx(degrees, abs=1e-9)
+
+
+def test_the_growth_is_e_to_the_way_over_the_length_of_divergence():
+    """L = r + ρ/r with ρ = a/b; the way of the contact from the arcs, chord by chord."""
+    plan = one_finger(0.2)
+    way = 0.0
+    contact = np.array([0.0, -R])
+    for arc in plan.pushes[0].arcs:
+        steps = exp(np.linspace(0, arc.duration, 2001)[:, None] * arc.twist)
+        c, s = np.cos(steps[:, 2]), np.sin(steps[:, 2])
+        places = steps[:, :2] + np.stack([-s * contact[1], c * contact[1]], axis=1)
+        way += float(np.sum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    rho = A / B
+    assert plan.certificate.growth == pytest.approx(np.exp(way / (R + rho / R)), rel=1e-5)
+
+
+def test_a_growth_beyond_e_to_the_fourth_is_warned_of():
+    assert pytest.approx(np.exp(4)) == TRUSTED_GROWTH
+    near, far = one_finger(0.2, (0.0, -0.05, 0.1)), one_finger(0.2, (0.0, -0.4, 0.1))
+    assert near.certificate.growth < np.exp(4) < far.certificate.growth < np.exp(30)
+    assert not any("cannot be trusted" in text for text in near.certificate.warnings)
+    assert any("cannot be trusted without" in text for text in far.certificate.warnings)
+
+
+def test_the_motion_and_curvature_margins_are_those_of_the_ellipsoid():
+    """Of diag(a, a, b): the contact at (0, -R) moves by (1 + R²/ρ) fx, fy; ω is b R fx."""
+    plan = one_finger(0.2)
+    rho = A / B
+    lean, most = np.arctan((1 + R * R / rho) * 0.8 * MU), np.arctan((1 + R * R / rho) * MU)
+    assert plan.certificate.motion_cone_margin_degrees == pytest.approx(np.degrees(most - lean), abs=1e-9)
+    turn = [R * t / rho / np.hypot((1 + R * R / rho) * t, 1) for t in (0.8 * MU, MU)]
+    assert plan.certificate.curvature_margin == pytest.approx(1 - turn[0] / turn[1], abs=1e-9)
+
+
+def test_cost_duration_and_goal_error_are_those_of_the_arcs():
+    plan = one_finger(0.2)
+    push = plan.pushes[0]
+    X = np.eye(3)
+    for x, y, angle in (plan.scene.start_pose, *(exp(arc.duration * arc.twist) for arc in push.arcs)):
+        c, s = np.cos(angle), np.sin(angle)
+        X = X @ np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
+    assert plan.certificate.goal_error[:2] == pytest.approx(X[:2, 2], abs=1e-12)
+    assert plan.certificate.goal_error[2] == pytest.approx(np.arctan2(X[1, 0], X[0, 0]), abs=1e-12)
+    car = plan.certificate.cars["below"]
+    flat = 0.5 * (np.array(car.left_centre) + np.array(car.right_centre))
+    way = sum(np.hypot(*velocity_at(arc.twist, flat)) * arc.duration for arc in push.arcs)
+    assert plan.certificate.cost == pytest.approx(way)
+    assert plan.certificate.duration == pytest.approx(sum(segment.times[-1] for segment in plan.segments))
+
+
+def pair(rng):
+    turns = rng.uniform(-0.5, 0.5, 2) * rng.integers(0, 2)
+    places = [np.array([x, -0.015]) for x in (0.009, -0.009)] + rng.uniform(-0.01, 0.01, 2)
+    return [
+        PointContact(p, [np.sin(t), np.cos(t)], rng.uniform(0.2, 0.7) if k else 0.5, hook=True)
+        for k, (p, t) in enumerate(zip(places, turns, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_margins_of_two_fingers_are_where_brute_force_finds_their_ends(seed):
+    """A grid of squeezes: of all forces that make the wrench, those that need the least friction."""
+    rng = np.random.default_rng(seed)
+    first, second = pair(rng)
+    contacts = [PointContact(c.point, c.normal, 0.5, hook=True) for c in (first, second)]
+    surface = Ellipsoid(np.diag([1.0, 1.0, 5000.0]))
+    F = contacts[0].wrench(contacts[0].normal + [0.1, 0]) + rng.uniform(0.3, 1) * contacts[1].wrench(
+        contacts[1].normal
+    )
+    twist = surface.twist(F)
+    frames = [(c.normal, np.array([-c.normal[1], c.normal[0]])) for c in contacts]
+    G = np.array([c.wrench(f) for c, frame in zip(contacts, frames, strict=True) for f in frame]).T
+    x, z = np.linalg.lstsq(G, surface.wrench(twist), rcond=None)[0], np.linalg.svd(G)[2][3]
+    least = np.inf
+    for width in (10.0, 0.1, 1e-3, 1e-5):
+        forces = x + np.linspace(-width, width, 4001)[:, None] * np.linalg.norm(x) * z
+        a, b = forces[:, 0::2], np.abs(forces[:, 1::2])
+        need = np.where(np.all(a > 1e-12, axis=1), np.max(b / np.where(a > 1e-12, a, 1.0), axis=1), np.inf)
+        best = int(np.argmin(need))
+        least, x = min(least, float(need[best])), forces[best]
+    assert composite_margin(contacts, surface, twist) == pytest.approx(1 - least / 0.5, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_two_fingers_on_a_side_may_lose_the_spacing_that_is_said(seed):
+    """Nearer together by the margin they still hold the motion, nearer by more they do not."""
+    rng = np.random.default_rng(seed)
+    surface = Ellipsoid(np.diag([1.0, 1.0, 5000.0]))
+
+    def at(spacing):
+        return [PointContact([x, -0.015], [0.0, 1.0], 0.5) for x in (0.5 * spacing, -0.5 * spacing)]
+
+    twist = surface.twist(
+        at(0.018)[0].wrench([rng.uniform(-0.3, 0.3), 1.0]) * 0.8 + at(0.018)[1].wrench([0.0, 0.2])
+    )
+    margin = spacing_margin(at(0.018), surface, twist)
+    assert 0 < margin < 1
+    assert two_point_sticks(at(0.018 * (1 - margin + 1e-5)), surface, twist)
+    assert not two_point_sticks(at(0.018 * (1 - margin - 1e-5)), surface, twist)
+
+
+def test_the_motion_of_two_fingers_may_turn_by_what_is_said():
+    contacts = [PointContact([x, -0.015], [0.0, 1.0], 0.5) for x in (0.009, -0.009)]
+    surface, middle = Ellipsoid(np.diag([1.0, 1.0, 5000.0])), np.array([0.0, -0.015])
+    twist = np.array([0.01, 0.03, 0.5])
+    found = cone_margins(contacts, surface, middle, twist)
+    u = velocity_at(twist, middle)
+
+    def sticks(degrees, tighter=1.0):
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        v, w = np.array([c * u[0] - s * u[1], s * u[0] + c * u[1]]), twist[2] * tighter
+        return two_point_sticks(contacts, surface, np.array([v[0] + w * middle[1], v[1] - w * middle[0], w]))
+
+    assert all(sticks(side * (found.motion - 1e-3)) for side in (1, -1))
+    assert not all(sticks(side * (found.motion + 1e-3)) for side in (1, -1))
+    assert sticks(0.0, 1 / (1 - found.curvature) - 1e-4)
+    assert not sticks(0.0, 1 / (1 - found.curvature) + 1e-4)
+
+
+def test_the_worse_of_two_margins_is_taken_one_by_one():
+    a = Margins(friction=0.3, motion=2.0, offset=0.001, unique=-0.01)
+    b = Margins(friction=0.2, motion=3.0, offset=0.002, composite=0.5)
+    assert worse_of(a, b) == Margins(friction=0.2, motion=2.0, offset=0.002, unique=-0.01, composite=0.5)
+    assert worse_of(b, a) == worse_of(a, b)
+
+
+def test_where_a_turn_is_certain_the_uniqueness_margin_is_positive():
+    """[Lynch1996] Theorem 4: the turning centre lies beyond the strip, square to the contact, that holds the object."""
+    for start, sign in (((0.0, -0.3, 0.3), 1), ((0.06, 0.02, 2.6), -1)):
+        thing = fp.Object(BLOCK, friction=0.4)
+        pushes = (fp.Push("below", thing.outline.at(0, 0.5), 2, 0.018),)
+        planning = fp.Planning(friction_margin=0.9 if sign > 0 else 0.0, iterations=1)
+        plan = fp.plan(
+            fp.Scene(thing, start, (0, 0, 0), fp.Pusher(fingers=2, spacing=0.018), pushes, planning=planning)
+        )
+        assert plan.status == "solved"
+        beyond = []
+        for arc in plan.pushes[0].arcs:
+            vx, vy, w = arc.twist
+            if w != 0:
+                beyond.append(abs(-vy / w) - 0.025)
+        assert plan.certificate.uniqueness_margin == pytest.approx(min(beyond), abs=1e-9)
+        assert np.sign(plan.certificate.uniqueness_margin) == sign
+
+
+def test_no_certificate_without_a_push_has_margins():
+    scene = fp.Scene(fp.Object(BLOCK), (0.0, 0.0, 0.0))
+    certificate = certify(scene, ())
+    assert certificate.friction_margin is None
+    assert certificate.cost == certificate.duration == 0
