@@ -101,9 +101,8 @@ def test_the_margins_of_two_fingers_are_where_brute_force_finds_their_ends(seed)
     first, second = pair(rng)
     contacts = [PointContact(c.point, c.normal, 0.5, hook=True) for c in (first, second)]
     surface = Ellipsoid(np.diag([1.0, 1.0, 5000.0]))
-    F = contacts[0].wrench(contacts[0].normal + [0.1, 0]) + rng.uniform(0.3, 1) * contacts[1].wrench(
-        contacts[1].normal
-    )
+    leaning = contacts[0].normal + np.array([0.1, 0.0])
+    F = contacts[0].wrench(leaning) + rng.uniform(0.3, 1) * contacts[1].wrench(contacts[1].normal)
     twist = surface.twist(F)
     frames = [(c.normal, np.array([-c.normal[1], c.normal[0]])) for c in contacts]
     G = np.array([c.wrench(f) for c, frame in zip(contacts, frames, strict=True) for f in frame]).T
@@ -167,13 +166,12 @@ def test_where_a_turn_is_certain_the_uniqueness_margin_is_positive():
         thing = fp.Object(BLOCK, friction=0.4)
         pushes = (fp.Push("below", thing.outline.at(0, 0.5), 2, 0.018),)
         planning = fp.Planning(friction_margin=0.9 if sign > 0 else 0.0, iterations=1)
-        plan = fp.plan(
-            fp.Scene(thing, start, (0, 0, 0), fp.Pusher(fingers=2, spacing=0.018), pushes, planning=planning)
-        )
+        pusher = fp.Pusher(fingers=2, spacing=0.018)
+        plan = fp.plan(fp.Scene(thing, start, (0, 0, 0), pusher, pushes, planning=planning))
         assert plan.status == "solved"
         beyond = []
         for arc in plan.pushes[0].arcs:
-            vx, vy, w = arc.twist
+            _, vy, w = arc.twist
             if w != 0:
                 beyond.append(abs(-vy / w) - 0.025)
         assert plan.certificate.uniqueness_margin == pytest.approx(min(beyond), abs=1e-9)
