@@ -3,9 +3,9 @@
     python tests/mutants.py [PART OF A FILE'S NAME]
 
 Reads tests/mutants/*.yaml, lists of {file, old, new, test}: in src/flatpush/<file> the text `old`, which stands there
-once, becomes `new`, and the test (a pytest node, or several) must then fail. The change is made in a copy of src; nothing
-of the checkout is touched. Entries with `kernel: true` change compiled code and start with an empty cache of kernels,
-because numba does not notice a callee that changed in another file; all others share one.
+once, becomes `new`, and the test (a pytest node, or several) must then fail. The change is made in a copy of src;
+nothing of the checkout is touched. Entries with `kernel: true` change compiled code and start with an empty cache of
+kernels, because numba does not notice a callee that changed in another file; all others share one.
 """
 
 import os
