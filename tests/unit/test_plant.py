@@ -7,7 +7,7 @@ import flatpush as fp
 from flatpush.contact import PointContact
 from flatpush.errors import InputError
 from flatpush.friction import Exact, LimitSurface
-from flatpush.simulation.plant import MODES, Plant
+from flatpush.simulation.plant import MODES, Plant, steps
 from flatpush.simulation.plant import plant as module
 from flatpush.simulation.plant.arrays import interpreted, outline_arrays, surface_arrays
 from flatpush.simulation.plant.contact_modes import one
@@ -176,6 +176,27 @@ def test_a_first_run_is_every_later_run_to_the_last_bit(monkeypatch, name):
     assert np.array_equal(runs[0].object, runs[1].object)
     assert np.array_equal(runs[0].modes, runs[1].modes)
     assert np.any(runs[0].object[-1] != 0)
+
+
+def test_a_finger_in_a_hollow_is_not_watched_step_by_step(monkeypatch):
+    """Its two contacts swapped places with the rounding, taken for a change of what is touched: every step was
+    halved to the least, and such a push cost a thousand times what others cost."""
+    feet = np.array([(10.19, -16.89), (-10.32, -1.77), (10.04, 7.51)]) / 1000
+    corners = [
+        (24.25, 9.57), (-18.72, 22.76), (-31.14, 1.14), (-18.80, -8.63), (-18.97, -23.40), (16.09, -23.50),
+        (18.04, -10.12),
+    ]  # fmt: skip
+    thing = fp.Object(np.array(corners) / 1000, fp.Support.points(feet, [0.131, 0.311, 0.558]), 0.33)
+    taken = []
+    real = steps._settle
+    monkeypatch.setattr(steps, "_settle", lambda *args: (taken.append(args[2]), real(*args)))
+    monkeypatch.setattr(module, "_patience", [1e9])
+    monkeypatch.setattr(module, "_ready", set())
+    way = np.array([[-24.35, -7.81, 0.0], [46.13, 63.13, 0.0]]) / 1000
+    run = Plant(thing, [[0.0, 0.0]], 0.0025).follow([0, 0, 0], way)
+    assert run.outcome == ""
+    assert 60 < len(taken) < 300
+    assert run.object[-1] == pytest.approx([0.028853, 0.012481, -1.579406], abs=2e-6)
 
 
 def test_what_makes_no_sense_is_refused(square):

@@ -48,7 +48,8 @@ class Fingers:
             tip = transform(inverse(q), transform(hands[i if len(hands) > 1 else 0], f))
             for slot, (d, point, normal, feature) in enumerate(facing(self.outline, tip)[:2]):
                 found.append(Touch(d - self.radius, point, normal, i, feature, slot))
-        return found
+        # By their features: which of two places in a hollow is nearer changes with the rounding.
+        return sorted(found, key=lambda touch: (touch.finger, touch.feature))
 
     def advance(
         self, q: Array, hands: Array, step: Array, body: bool = False

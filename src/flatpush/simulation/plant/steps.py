@@ -214,18 +214,22 @@ def _contacts(
         first = place.distance - setting.radius <= touch if mask < 0 else (mask >> (2 * i) & 1) == 1
         if not first and place.distance - setting.radius > touch:
             continue
-        for slot in range(2):
-            if slot == 1:
-                place = second(setting.outline, x, y, place.feature)
-            if mask < 0:
-                takes = place.distance - setting.radius <= touch
-            else:
-                takes = (mask >> (2 * i + slot) & 1) == 1 and place.distance < np.inf
-            if takes:
-                found |= 1 << (2 * i + slot)
-                if count < len(contacts):
-                    _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), place)
-                count += 1
+        other = second(setting.outline, x, y, place.feature)
+        if mask < 0:
+            both = other.distance - setting.radius <= touch
+        else:
+            both = (mask >> (2 * i + 1) & 1) == 1 and other.distance < np.inf
+        found |= (1 if first else 0) << (2 * i) | (1 if both else 0) << (2 * i + 1)
+        # In a hollow by their features: which of two touching places is nearer changes with the rounding.
+        if both and (not first or other.feature < place.feature):
+            place, other = other, place
+        if (first or both) and count < len(contacts):
+            _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), place)
+        count += 1 if first or both else 0
+        if first and both:
+            if count < len(contacts):
+                _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), other)
+            count += 1
     return count, found
 
 
