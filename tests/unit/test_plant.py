@@ -206,8 +206,14 @@ def test_what_makes_no_sense_is_refused(square):
     for keys in ({"friction": -0.1}, {"model": "local"}, {"cof": [0.0]}):
         with pytest.raises(InputError):
             Plant(square, [[0.0, 0.0]], 0.1, **keys)
+    with pytest.raises(InputError, match="1000 times the object's size"):
+        Plant(square, [[1e9, 0.0]], 0.1)
     plant = Plant(square, [[0.0, 0.0]], 0.1)
+    with pytest.raises(InputError, match="20000 times the object's size"):
+        plant.follow([0, 0, 0], [[-1.2, 0, 0], [1e9, 0, 0]])
     state = plant.start([0, 0, 0], [-1.1, 0, 0])
+    with pytest.raises(InputError, match="20000 times the object's size"):
+        plant.step(state, [1e9, 0, 0], 1.0)
     for velocity, dt in (([1, 0], 0.1), ([np.nan, 0, 0], 0.1), ([1, 0, 0], -0.1)):
         with pytest.raises(InputError):
             plant.step(state, velocity, dt)

@@ -1,5 +1,6 @@
 """Spreads a study over the processes of a Dask cluster: a local one, or one that exists."""
 
+import asyncio
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,7 +8,8 @@ from typing import Any
 
 from ..errors import FlatpushError, InputError, MissingExtra
 
-PATIENCE = 8.0  # [s] for a scheduler to answer
+PATIENCE = 8.0  # [s] for a scheduler to find workers
+ANSWER = 3.0  # [s] for it to say who it is
 
 
 @contextmanager
@@ -40,10 +42,11 @@ def cluster(scheduler: str | None) -> Iterator[Any]:
                 yield _mapper(client)
             return
         try:
+            asyncio.run(asyncio.wait_for(_ask(scheduler), ANSWER))
             client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError, TypeError) as error:
             raise InputError(
-                f"no Dask scheduler answers within {PATIENCE:.0f} s",
+                f"no Dask scheduler answers within {ANSWER:.0f} s",
                 key="--scheduler",
                 value=scheduler,
                 hint="Start one with: dask scheduler; its address looks like tcp://host:8786.",
@@ -60,6 +63,26 @@ def cluster(scheduler: str | None) -> Iterator[Any]:
                         hint=f"Start some with: dask worker {scheduler}",
                     ) from None
             yield _mapper(client)
+
+
+async def _ask(scheduler: str) -> None:
+    """Asks a scheduler who it is. A Client would wait for minutes for what listens and is none.
+
+    Raises:
+        OSError, TimeoutError, ValueError: if there is none.
+    """
+    from distributed.comm import connect
+
+    if not scheduler.rpartition(":")[2].rstrip("/").isdigit():
+        raise ValueError("an address ends with a port")
+    comm = await connect(scheduler, timeout=ANSWER)
+    try:
+        await comm.write({"op": "identity", "reply": True})
+        answer = await comm.read()
+    finally:
+        comm.abort()
+    if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
+        raise ValueError("what answers is no scheduler")
 
 
 def _mapper(client: Any) -> Any:

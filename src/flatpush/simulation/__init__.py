@@ -4,9 +4,9 @@ Nothing here imports steering or planning: a mistake there shows as a failed cla
 """
 
 from .claims import certify, clearance_of
-from .noise import Noise
+from .noise import Noise, Perturbation
 from .proof import Proof, prove
-from .rollout import Perturbation, simulate
+from .rollout import simulate
 from .study import Runs, study
 from .verify import Claim, Report, verify
 

@@ -59,6 +59,9 @@ class Noise:
             raise InputError("a Wishart draw has at least 3 degrees of freedom", key="df", value=self.df)
 
 
+Perturbation = Noise  # of a single run, by its older name
+
+
 class Disturbances:
     """Disturbed scenes of one plan: each is a function of the seed and of its number alone.
 
@@ -96,8 +99,11 @@ class Disturbances:
         )
 
     def scene_of(self, seed: int, run: int) -> Scene:
-        """The scene of one run: its start and its object are drawn."""
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run,)))
+        """The scene of one run of many: its start and its object are drawn."""
+        return self.draw(np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run,))))
+
+    def draw(self, rng: np.random.Generator) -> Scene:
+        """A scene whose start and object are drawn."""
         noise, thing = self.noise, self.scene.object
         start = np.asarray(self.scene.start, dtype=float) + rng.standard_normal(3) * [
             noise.position, noise.position, noise.angle,

@@ -1,7 +1,7 @@
 """Quasi-static motion of the object under the planned motion of the pusher."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,31 +13,11 @@ from ..problem import Plan, Rollout, Scene
 from ..problem.mechanics import named, placement_of, surface_of
 from ..problem.scene import Model
 from .corners import passed_a_corner
+from .noise import Disturbances, Noise
 from .pieces import Source
 from .plant import MODES, OUTCOMES, Plant
 from .plant.codes import REST, SEPARATION, STICKING
 from .stretches import Stretch, stretches
-
-
-@dataclass(frozen=True)
-class Perturbation:
-    """What differs from the plan in a perturbed run: standard deviations of the start pose and of friction.
-
-    Attributes:
-        position: of the start, each axis [m].
-        angle: of the start [rad].
-        friction: of the coefficient, relative.
-    """
-
-    position: float = 0.0005
-    angle: float = float(np.deg2rad(0.5))
-    friction: float = 0.1
-
-    def __post_init__(self) -> None:
-        for name in ("position", "angle", "friction"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise InputError("noise is a finite number, 0 or more", key=name, value=value)
 
 
 def simulate(
@@ -46,7 +26,7 @@ def simulate(
     *,
     model: Model = "exact",
     source: Source = "arcs",
-    perturbation: Perturbation | None = None,
+    perturbation: Noise | None = None,
 ) -> Rollout:
     """Rolls a plan out: the fingers move as planned, the object as contact and table let it.
 
@@ -54,8 +34,9 @@ def simulate(
     (simulation.plant). Where it lands on the object, the object is moved aside first.
 
     Args:
-        seed: of the perturbation; without one the run is the nominal one.
+        seed: of the draw.
         model: limit surface under which the object moves; "exact" is the support's own, or the known one.
+        perturbation: what is drawn; without one the run is the nominal one.
         source: the pusher's way: the plan's "arcs" exactly, or straight between its "samples".
 
     Raises:
@@ -65,13 +46,8 @@ def simulate(
         raise InputError("there is no plan to roll out", hint=plan.reason)
     scene = plan.scene
     if perturbation is not None:
-        rng = np.random.default_rng(seed)
-        noise, relative_friction = rng.standard_normal(3), rng.standard_normal()
-        scale = np.array([perturbation.position, perturbation.position, perturbation.angle])
-        mu = scene.object.friction * max(0.0, 1 + perturbation.friction * relative_friction)
-        scene = replace(
-            scene, start=scene.start_pose + scale * noise, object=replace(scene.object, friction=mu)
-        )
+        disturbances = Disturbances(scene, perturbation, model)
+        scene, model = disturbances.draw(np.random.default_rng(seed)), disturbances.model_of()
     rolled = roll(plan, [scene], model, source)
     n = int(np.count_nonzero(np.isfinite(rolled.object[0, :, 0])))
     return Rollout(

@@ -41,6 +41,12 @@ from .plain import Fingers
 Codes = NDArray[np.integer]
 
 
+FARTHEST = (
+    1e3  # fingertips from their hand, by the outline's size: a turn moves them by as many steps of the plant
+)
+LONGEST = 2e4  # way of a hand in one run, by the outline's size: some ten seconds of compiled steps
+
+
 @dataclass(frozen=True, eq=False)
 class PlantState:
     """Where object and fingers are.
@@ -145,6 +151,11 @@ class Plant:
             raise InputError("fingers are one or more points [x, y] in the pusher's frame", value=fingers)
         if not (np.isfinite(tip_radius) and tip_radius >= 0):
             raise InputError("a tip radius is a finite number, 0 or more", value=tip_radius)
+        if np.max(np.hypot(*tips.T)) > FARTHEST * thing.outline.size:
+            raise InputError(
+                f"a fingertip is at most {FARTHEST:g} times the object's size from the hand's origin",
+                value=tips.tolist(),
+            )
         mu = thing.friction if friction is None else float(friction)
         if not (np.isfinite(mu) and mu >= 0):
             raise InputError("friction is a finite number, 0 or more", value=friction)
@@ -180,6 +191,7 @@ class Plant:
         step = np.atleast_2d(np.array(velocity, dtype=float)) * dt
         if step.shape != hands.shape or not np.isfinite(step).all():
             raise InputError("a velocity is three finite numbers for each hand", value=velocity)
+        self._refuse_too_long(np.abs(step) * [1.0, 1.0, self._outline.size])
         if state.outcome:
             return state
         done = self._run(state.object[None], np.stack([hands, hands + step])[None], AS_IT_IS)
@@ -269,7 +281,14 @@ class Plant:
             raise InputError("the hand's way is poses, shape (n, 3)", value=np.shape(hand))
         if not np.isfinite(way).all():
             raise InputError("the poses of the hand are finite numbers")
+        self._refuse_too_long(np.sum(np.abs(np.diff(way[..., :2], axis=0)), axis=0))
         return np.ascontiguousarray(way)
+
+    def _refuse_too_long(self, ways: Array) -> None:
+        if ways.max(initial=0.0) > LONGEST * self._outline.size:
+            raise InputError(
+                f"a hand goes at most {LONGEST:g} times the object's size in one run", value=float(ways.max())
+            )
 
     def _run(
         self,
