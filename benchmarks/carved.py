@@ -21,7 +21,7 @@ from flatpush.planning.obstacles import Task, task_of
 def carved_task(seed: int) -> Task:
     """The task of a carved scene with the one push of its path."""
     found = carved(seed, pushes=1)
-    planner = fp.Planner(replace(found.scene, pushes=(found.legs[0].option.push,)))
+    planner = fp.Planner(replace(found.scene, pushes=(found.options[found.path.pushes[0]].push,)))
     return task_of(planner.scene, planner.usable, planner.fleet)
 
 

@@ -14,7 +14,7 @@ from flatpush.planning.obstacles import Search
 
 def main(seeds: int, seconds: float) -> None:
     task = stored_task(Path(__file__).parents[2] / "shared" / "data", need=1.5e-5)
-    Search(task, 0).prepare()
+    next(Search(task, 0).rounds())  # compiles
     rows = []
     for seed in range(seeds):
         search, began, clock, first = Search(task, seed), time.thread_time(), time.perf_counter(), None

@@ -159,7 +159,6 @@ def test_first_path_next_to_ompl():
 
     util.setLogLevel(util.LOG_NONE)
     every = scenes()
-    Search(task(), 0).prepare()
     ours(task(), 0)
     a_all, b_all, count, spent = [], [], 0, 0.0
     print()

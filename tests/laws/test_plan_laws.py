@@ -141,7 +141,8 @@ def test_moving_the_scene_moves_the_plan(triangle):
     moved = fp.Scene(triangle, compose(X, scene.start), compose(X, scene.goal))
     a, b = fp.plan(scene), fp.plan(moved)
     assert b.cost == pytest.approx(a.cost)
-    assert pose_error(b.pushes[0].object, compose(X, a.pushes[0].object)) == pytest.approx(0, abs=1e-9)
+    # Where the push changes is the place of a minimum, known to about the root of rounding.
+    assert pose_error(b.pushes[0].object, compose(X, a.pushes[0].object)) == pytest.approx(0, abs=3e-8)
 
 
 @pytest.mark.slow

@@ -23,7 +23,8 @@ def planned(scene, **planning):
 def test_the_path_that_a_scene_is_carved_along_keeps_clear(seed):
     """By the judge, with landing, leaving and all transits; so there is a plan whatever the planner finds."""
     found = carved(seed)
-    segments = assemble(found.scene, Planner(found.scene).transits, found.legs)
+    transits = Planner(found.scene).transits
+    segments = assemble(found.scene, transits, found.options, found.path)
     assert clearance_of(found.scene, segments) > 0.0005
     end = segments[-2].object[-1]
     assert np.allclose(end, found.scene.goal_pose, atol=1e-9)

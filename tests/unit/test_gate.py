@@ -37,7 +37,7 @@ def two_pushes(asked):
     from flatpush.planning.assembly import Leg, assemble
     from flatpush.simulation import certify
 
-    planner = Planner(asked, tree=False)
+    planner = Planner(asked)
     first, second = sorted(planner.usable, key=lambda option: option.push.name)
     goals = (np.array([0.08, 0.0, 0.0]), np.array([0.0, 0.0, 0.0]))
     ways = zip((first, second), goals, strict=True)

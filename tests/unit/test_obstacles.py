@@ -186,7 +186,7 @@ def test_the_planner_plans_the_maze_with_a_certificate():
     for segment in plan.pushes:
         body = Body.of(plan.scene.object.outline, placements[segment.push].tips, plan.scene.pusher.tip_radius)
         assert dense_clearance(world, body, segment.object[0], body_steps(segment)) >= 0
-    assert len(seen) > 10
+    assert len(seen) > 5
     assert seen[-1][0] <= costs[0]
     explored = planner.explored
     assert explored.ndim == 3

@@ -9,7 +9,10 @@ from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.errors import InputError
-from flatpush.planning.assembly import Leg, assemble, costs, words_of
+from flatpush.geometry import pose_error
+from flatpush.planning.assembly import assemble
+from flatpush.planning.empty_table import direct_paths
+from flatpush.planning.path import Path
 from flatpush.simulation import certify
 
 STARTS = [(0.06, 0.02, 2.6), (0.02, -0.03, 1.57), (-0.05, 0.04, -2.0)]
@@ -71,16 +74,15 @@ def test_a_push_that_follows_itself_does_not_let_go(rectangle, fingers):
     pusher = fp.Pusher(fingers=2, spacing=0.018) if fingers == 2 else fp.Pusher()
     scene = fp.Scene(rectangle, (0.0, -0.06, 0.2), pusher=pusher)
     planner = fp.Planner(scene)
-    option = planner.usable[-1]
-    legs = []
-    here = scene
+    last, here, pieces = planner.fleet.size - 1, np.array(scene.start_pose), []
     for goal in ((0.002, -0.03, 0.1), (0.0, 0.0, 0.0)):
-        here = replace(here, goal=goal)
-        word = words_of(here, option)[int(np.argmin(costs(here, option)))]
-        legs.append(Leg(option, word.word, word.parameters, np.array(goal)))
-        here = replace(here, start=goal)
-    segments = assemble(planner.scene, planner.transits, legs)
-    assert [segment.kind for segment in segments] == ["transit", "push", "push", "transit"]
+        words = direct_paths(planner.fleet, here, np.array(goal))
+        pieces += next(path.pieces for path in words if path.pushes == (last,))
+        here = np.array(goal)
+    path = Path.of(planner.fleet, scene.start_pose, pieces)
+    segments = assemble(planner.scene, planner.transits, planner.usable, path)
+    assert [segment.kind for segment in segments] == ["transit", "push", "transit"]
+    assert pose_error(segments[1].object[-1], [0.0, 0.0, 0.0]) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
     certificate = certify(planner.scene, segments)
     found = fp.Plan(
         "solved",

@@ -6,10 +6,10 @@ and the hand that changes its push leave room. Everything is drawn from a seed.
 As an experiment it plans each of them and prints how soon the first path came, what is best and how clear it is.
 """
 
+import pathlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,9 @@ import numpy as np
 from ..geometry import Outline, compose, exp, transform
 from ..geometry.pose import Array
 from ..planning import Planner
-from ..planning.assembly import Leg, car_of
+from ..planning.assembly import car_of
 from ..planning.options import PushOption
+from ..planning.path import Path, Piece
 from ..problem import Object, Planning, Pusher, Scene, Workspace
 
 OBJECTS: tuple[tuple[tuple[float, float], ...], ...] = (
@@ -34,10 +35,11 @@ SECONDS = 2.0  # of planning each scene
 
 @dataclass(frozen=True, eq=False)
 class Carved:
-    """A scene with the pushes that its obstacles leave room for, from its start to its goal."""
+    """A scene with a path that its obstacles leave room for, of pushes that are numbers of the options."""
 
     scene: Scene
-    legs: tuple[Leg, ...]
+    options: tuple[PushOption, ...]
+    path: Path
 
 
 def carved(
@@ -54,13 +56,13 @@ def carved(
     import shapely
 
     rng = np.random.default_rng(seed)
-    thing, pusher, options = _thing(seed % len(OBJECTS), int(rng.integers(len(FRICTIONS))))
+    thing, pusher, planner = _thing(seed % len(OBJECTS), int(rng.integers(len(FRICTIONS))))
     start = np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)])
-    X, solid, legs = start, [], []
+    X, solid, pieces = start, [], list[Piece]()
     for _ in range(int(rng.integers(1, pushes + 1))):
-        option = options[int(rng.integers(len(options)))]
-        car, word = car_of(option), ""
-        amounts: list[float] = []
+        push = int(rng.integers(len(planner.usable)))
+        option = planner.usable[push]
+        car = car_of(option)
         shape, middle, hand = _driven(thing, pusher, option)
         begin = X
         for letter in rng.permutation(3):
@@ -71,8 +73,7 @@ def carved(
             poses = compose(X, exp(shares[:, None] * amount * twist))
             solid += [_moved(shape, pose) for pose in poses]
             X = poses[-1]
-            word, amounts = word + "LSR"[letter], [*amounts, float(amount)]
-        legs.append(Leg(option, word, np.array(amounts), X))
+            pieces.append((push, int(letter), float(amount)))
         # Room for the hand, however it is turned, at both ends of a push.
         solid += [shapely.Point(transform(pose, middle)).buffer(1.2 * hand) for pose in (begin, X)]
     way = shapely.union_all(solid).buffer(ROOM)
@@ -81,9 +82,8 @@ def carved(
     box = (xmin - room, ymin - room, xmax + room, ymax + room)
     placed = _strewn(rng, way, (xmin - 0.05, ymin - 0.05, xmax + 0.05, ymax + 0.05), obstacles, round_)
     planning = Planning(seed=seed, time_limit=5.0, iterations=10**6)
-    return Carved(
-        Scene(thing, start, X, pusher, workspace=Workspace(box, placed), planning=planning), tuple(legs)
-    )
+    scene = Scene(thing, start, X, pusher, workspace=Workspace(box, placed), planning=planning)
+    return Carved(scene, planner.usable, Path.of(planner.fleet, start, pieces))
 
 
 def narrow_passage(gap: float = 0.045) -> Scene:
@@ -142,7 +142,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def run(figures: Path | None) -> str:
+def run(figures: pathlib.Path | None) -> str:
     """A table of all scenes; into the folder, a drawing of each plan."""
     rows = ["scene            obstacles  first path   best   clearance"]
     for name, make in SCENES.items():
@@ -171,11 +171,11 @@ def _scene(start: Any, goal: Any, bounds: Any, obstacles: Any, seed: int = 0) ->
 
 
 @cache
-def _thing(number: int, friction: int) -> tuple[Object, Pusher, tuple[PushOption, ...]]:
-    """An object, its pusher and the pushes that are cars: the same ones for every scene, so they are sought once."""
+def _thing(number: int, friction: int) -> tuple[Object, Pusher, Planner]:
+    """An object, its pusher and a planner with the pushes: the same ones for every scene, so they are sought once."""
     thing = Object(OBJECTS[number], "uniform", friction=FRICTIONS[friction])
     pusher = Pusher(fingers=2, spacing=0.015)
-    return thing, pusher, Planner(Scene(thing, (0.1, 0.0, 0.0), pusher=pusher)).usable
+    return thing, pusher, Planner(Scene(thing, (0.1, 0.0, 0.0), pusher=pusher))
 
 
 def _driven(thing: Object, pusher: Pusher, option: PushOption) -> tuple[Any, Array, float]:

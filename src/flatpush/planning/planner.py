@@ -1,7 +1,6 @@
 """Plans of one or many pushes for one object and goal, from any start."""
 
-import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..compiling import clock
 from ..errors import FlatpushError
 from ..geometry import pose_error
 from ..geometry.pose import Array
@@ -17,18 +17,17 @@ from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
 from ..simulation import certify
 from ..steering.fleet import Fleet
+from .among_obstacles import AmongObstacles, Progress
 from .answer import Answer
-from .around import Around, Progress
-from .assembly import Leg, Segments, assemble, car_of, costs, words_of
+from .assembly import Segments, assemble, car_of
 from .candidates import automatic_pushes
+from .empty_table import ROUND, Found, direct_paths, refined_paths
 from .fleets import fleet_of
 from .freedom import Freedom, freedom
 from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
 
-# A round of the search counts as this many of the scene's iterations.
-ROUND = 3300
 # Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
 ROUNDS_OF_MANY = 1
 
@@ -63,7 +62,7 @@ class Planner:
         self.options = () if scene.pushes == "auto" else push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
         self._progress = progress
-        self._around: Around | None = None
+        self._among: AmongObstacles | None = None
 
     @property
     def freedom(self) -> Freedom:
@@ -103,7 +102,7 @@ class Planner:
         Raises:
             InputError: if the object cannot be at the start or at the goal, among what is in the way there.
         """
-        began = time.perf_counter()
+        began = clock()
         scene = self.scene if start is None else replace(self.scene, start=start)
         if _crowded(scene):
             check_endpoints(scene)
@@ -114,86 +113,47 @@ class Planner:
             reason = f"no push can steer the object. {_listed(self.reasons)}"
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
-        best = np.inf
+        best, stopped_by, details = np.inf, "", dict[str, Any]()
         reasons, blocked = self.reasons, ""
         if _crowded(scene):
-            self._around = Around(scene, self.usable, self.fleet, self.transits, self._progress)
-            for cost, segments, found in self._around.answers(partial(self._unhindered, scene)):
-                best = cost
-                yield Answer(cost, partial(_solved, scene, segments, began, found), found)
-            blocked = self._around.tried
+            self._among = AmongObstacles(scene, self.usable, self.fleet, self.transits, self._progress)
+            for found, segments in self._among.plans():
+                best, details = found.cost, found.details
+                yield Answer(best, partial(_solved, scene, segments, began, details), details)
+            stopped_by = self._among.stopped_by
+            blocked = self._among.tried
         else:
-            for cost, legs, found in self._candidates(scene):
-                if cost >= best * (1 - 1e-12):
+            for found in self._candidates(scene):
+                stopped_by = found.details.pop("stopped_by", "")
+                if found.cost >= best * (1 - 1e-12):
                     continue
                 try:
-                    segments = assemble(scene, self.transits, legs)
+                    segments = assemble(scene, self.transits, self.usable, found.path)
                 except FlatpushError as error:
-                    reasons.setdefault(legs[0].option.push.name, str(error))
+                    reasons.setdefault(self.usable[found.path.pushes[0]].push.name, str(error))
                     continue
-                best = cost
-                yield Answer(cost, partial(_solved, scene, segments, began, found), found)
+                best, details = found.cost, found.details
+                yield Answer(best, partial(_solved, scene, segments, began, details), details)
+        if stopped_by == "time_limit":
+            details["stopped_by"] = stopped_by  # of the last answer, whose plan is yet to be made
         if np.isinf(best):
             yield Answer(np.inf, partial(_none, scene, blocked + _listed(reasons), began))
 
     @property
     def explored(self) -> Array | None:
-        return None if self._around is None else self._around.explored
+        return None if self._among is None else self._among.explored
 
-    def _unhindered(self, scene: Scene) -> Iterator[Sequence[Leg]]:
-        """What the search without obstacles finds: where it is clear of them there is nothing better."""
-        for _, legs, _ in self._searched(scene, np.inf):
-            yield legs
-
-    def _candidates(self, scene: Scene) -> Iterator[tuple[float, Sequence[Leg], dict[str, Any]]]:
-        """Ways with their costs: the cheapest single push, then what the search finds; all single ones if it is one."""
-        singles = sorted(
-            (
-                (cost, i, k)
-                for i, option in enumerate(self.usable)
-                for k, cost in enumerate(costs(scene, option))
-            ),
-        )
+    def _candidates(self, scene: Scene) -> Iterator[Found]:
+        """The cheapest single push, then what the refinement finds; all words of the push if it is the only one."""
+        singles = direct_paths(self.fleet, scene.start_pose, scene.goal_pose)
         several = len(self.usable) > 1
-        for cost, i, k in singles[:1] if several else singles:
-            word = words_of(scene, self.usable[i])[k]
-            leg = Leg(self.usable[i], word.word, word.parameters, scene.goal_pose)
-            yield cost, (leg,), {"single_cost": singles[0][0]}
+        single = {"single_cost": singles[0].cost}
+        for path in singles[:1] if several else singles:
+            yield Found(path, path.cost, dict(single))
         if several:
-            yield from self._searched(scene, singles[0][0])
-
-    def _searched(self, scene: Scene, single: float) -> Iterator[tuple[float, Sequence[Leg], dict[str, Any]]]:
-        from .refine import improvements
-
-        planning = scene.planning
-        search = improvements(
-            self.fleet,
-            scene.start_pose,
-            scene.goal_pose,
-            robust=planning.robust,
-            seed=planning.seed,
-        )
-        clock = 0.0
-        for done, refined in enumerate(search):
-            found = {
-                "single_cost": single,
-                "cost_before_refinement": refined.cost_before,
-                "replanning_cost": refined.replanning_cost,
-                "rounds": done,
-            }
-            legs = [
-                Leg(self.usable[int(a)], word, np.asarray(amounts), np.asarray(goal))
-                for a, word, amounts, goal in zip(
-                    refined.pushes, refined.words, refined.amounts, refined.poses[1:], strict=True
-                )
-            ]
-            yield (refined.replanning_cost if planning.robust else refined.cost), legs, found
-            if done == 1:
-                # The first round is always finished, and what it compiles on first use is not the search's time.
-                clock = time.perf_counter()
-            late = done >= 1 and time.perf_counter() - clock > planning.time_limit
-            if late or done >= max(1, planning.iterations // ROUND):
-                return
+            for found in refined_paths(scene, self.fleet):
+                found.details.update(single)
+                yield found
 
     @cached_property
     def transits(self) -> Transits:
@@ -245,4 +205,4 @@ def _none(scene: Scene, reason: str, began: float) -> Plan:
 def _run(began: float) -> dict[str, Any]:
     from .. import __version__
 
-    return {"version": __version__, "planning_time": time.perf_counter() - began}
+    return {"version": __version__, "planning_time": clock() - began}

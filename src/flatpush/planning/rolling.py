@@ -63,8 +63,10 @@ class _Table:
         return np.moveaxis(np.asarray(chebyshev.chebval(x, self.series[turn]), dtype=float), 0, -1)
 
 
-def rolling_segment(scene: Scene, option: PushOption, arcs: list[ArcGeometry]) -> PushSegment:
-    """The timed push of one finger that keeps its direction.
+def rolling_segment(
+    scene: Scene, option: PushOption, arcs: list[ArcGeometry], start: Array, end: Array
+) -> PushSegment:
+    """The timed push of one finger that keeps its direction, from pose to pose (X_WO).
 
     Raises:
         FlatpushError: if the contact rolls off its edge, or no word of this kind reaches the goal.
@@ -72,10 +74,9 @@ def rolling_segment(scene: Scene, option: PushOption, arcs: list[ArcGeometry]) -
     turns = [arc.turn for arc in arcs]
     first = np.array([abs(a.step[2]) if a.turn != "straight" else a.flat_length for a in arcs])
     table = _tabulate(scene, option, turns, first)
-    goal = scene.goal_pose.copy()
-    goal[2] = scene.start_pose[2] + sum(float(a.step[2]) for a in arcs)
-    values = _solve(scene.start_pose, goal, turns, first, table)
-    return _timed(scene, option, turns, values, table)
+    goal = np.array([*end[:2], start[2] + sum(float(a.step[2]) for a in arcs)])
+    values = _solve(start, goal, turns, first, table)
+    return _timed(scene, option, start, turns, values, table)
 
 
 def _tabulate(scene: Scene, option: PushOption, turns: list[str], values: Array) -> _Table:
@@ -152,9 +153,11 @@ def _solve(start: Array, goal: Array, turns: list[str], values: Array, table: _T
     return values
 
 
-def _timed(scene: Scene, option: PushOption, turns: list[str], values: Array, table: _Table) -> PushSegment:
+def _timed(
+    scene: Scene, option: PushOption, start: Array, turns: list[str], values: Array, table: _Table
+) -> PushSegment:
     assert option.car is not None
-    outline, pusher, start = scene.object.outline, scene.pusher, scene.start_pose
+    outline, pusher = scene.object.outline, scene.pusher
     hand = float(start[2] + option.car.pusher[2])
 
     def tip(pose: Array) -> Array:

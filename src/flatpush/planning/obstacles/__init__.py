@@ -7,7 +7,7 @@ Whether a motion keeps the clearance is decided exactly, between its ends includ
 
 from .endpoints import check_endpoints
 from .prune import pruned
-from .scene_task import careful, legs_of, obstructions, path_of, task_of
+from .scene_task import careful, obstructions, task_of
 from .search import Search
 from .task import Task
 
@@ -16,9 +16,7 @@ __all__ = [
     "Task",
     "careful",
     "check_endpoints",
-    "legs_of",
     "obstructions",
-    "path_of",
     "pruned",
     "task_of",
 ]

@@ -1,4 +1,4 @@
-"""The task of a scene, and the legs of a path."""
+"""The task of a scene, and why it cannot be done."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,9 +9,7 @@ from ...geometry import transform
 from ...geometry.collision import Body, World
 from ...problem import Scene
 from ...steering.fleet import Fleet
-from ..assembly import Leg
 from ..options import PushOption
-from ..path import Path
 from ..transits import LEAST_GAP
 from .task import Task
 
@@ -43,21 +41,6 @@ def careful(scene: Scene, task: Task) -> Task:
     return replace(
         task, room=2.05 * float(np.max(task.arrays.hands["reach"])) + 2 * gap + scene.planning.clearance
     )
-
-
-def legs_of(path: Path, options: Sequence[PushOption]) -> list[Leg]:
-    """The pushes of a path; the last one leads to its end."""
-    return [Leg(options[push], word, amounts, end) for push, word, amounts, end in path.stretches]
-
-
-def path_of(legs: Sequence[Leg], options: Sequence[PushOption], task: Task) -> Path:
-    """Legs as a path."""
-    pieces = [
-        (options.index(leg.option), "LSR".index(letter), float(amount))
-        for leg in legs
-        for letter, amount in zip(leg.word, leg.amounts, strict=True)
-    ]
-    return Path.of(task.fleet, task.start, pieces)
 
 
 def obstructions(scene: Scene, task: Task, options: Sequence[PushOption]) -> str:

@@ -1,13 +1,10 @@
 """An anytime search among obstacles: trees, then lattices from coarse to fine, and every path they find made better."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from ...geometry import compose, exp
-from ...geometry.collision import World
 from ...geometry.pose import Array
 from ..path import Path
 from .lattice import Lattice, Level, Reach
@@ -25,8 +22,6 @@ CHAINS = 5  # that are kept
 MOST = 1 << 20  # poses of a lattice; then the next begins
 ANGLES = (12, 1024)
 DRAWN = 2000  # edges of a tree, for figures
-NEAR_TWIST = np.array([1.0, 1.0, 0.0])
-prepared = False
 
 
 class Search:
@@ -55,22 +50,6 @@ class Search:
     @cached_property
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self._seed)
-
-    def prepare(self) -> None:
-        """Compiles, or loads what was compiled, so that it is not the search's time."""
-        global prepared
-        if prepared:
-            return
-        prepared = True
-        near = replace(
-            self.task, goal=compose(self.task.start, exp(0.5 * self.task.fleet.radius[0] * NEAR_TWIST))
-        )
-        near = replace(near, world=World.of())
-        Trees(near, 0, direct=False)
-        one = Search(near, 0)
-        for turn, _ in enumerate(one.rounds()):
-            if turn > 8:
-                break
 
     @property
     def cost(self) -> float:

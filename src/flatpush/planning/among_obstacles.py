@@ -1,37 +1,39 @@
-"""Answers of the search among obstacles: each path is made a plan, checked as a whole, and only then given."""
+"""The search among obstacles for a scene: each path is made a plan, checked as a whole, and only then given."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
+from ..compiling import clock
 from ..errors import FlatpushError
 from ..geometry import Outline, compose, exp, transform
 from ..geometry.collision import Body, World
 from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
-from .assembly import Leg, Segments, assemble
-from .obstacles import Search, careful, legs_of, obstructions, path_of, pruned, task_of
+from .assembly import Segments, assemble
+from .empty_table import Found, refined_paths
+from .obstacles import Search, careful, obstructions, pruned, task_of
 from .options import PushOption
 from .path import Path
 from .segments import SAG
 from .transits import Transits
 
-# The search stops after this many expansions of poses or tries at a better path for each of the scene's iterations.
-WORK = 30
+# For each of the scene's iterations the search may expand so many poses or try so many moves in all, and without an
+# improvement of at least BETTER.
+WORK, PATIENCE = 30, 4
 BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
 FAR = 1.0  # clearances beyond it are not told apart [m]
 SAMPLES = 7  # points of an edge that is drawn
 Progress = Callable[[float, float, int], object]
 
 
-class Around:
-    """One question among obstacles.
+class AmongObstacles:
+    """One query among obstacles.
 
     Attributes:
         search: the search, for what it has seen.
+        stopped_by: the limit that ended it, "time_limit" or "iterations"; empty before, and where it was through.
         tried: what was tried so far, in words.
     """
 
@@ -47,79 +49,75 @@ class Around:
         self.task = task_of(scene, options, fleet)
         self.search = Search(self.task, scene.planning.seed)
         self.best, self.refused = np.inf, 0
-        self.complaint = ""
+        self.complaint = self.stopped_by = ""
         self._first: float | None = None
 
-    def answers(
-        self, unhindered: Callable[[], Iterator[Sequence[Leg]]]
-    ) -> Iterator[tuple[float, Segments, dict[str, Any]]]:
-        """Cost, segments and what to tell of better and better plans; ends with the limits of the scene.
-
-        Args:
-            unhindered: finds ways as if there were nothing in the path; asked where it may be so.
-        """
+    def plans(self) -> Iterator[tuple[Found, Segments]]:
+        """Better and better paths that are plans as a whole; ends with the limits of the scene."""
         self.complaint = obstructions(self.scene, self.task, self.options)
         if self.complaint:
             return
-        self.search.prepare()
-        began = time.perf_counter()
-        searched = self._rounds(began, self.search, unhindered)
-        for path in searched:
-            found = self._checked(path, began)
-            if found is not None:
-                yield found
+        began = clock()
+        for path in self._rounds(began, self.search):
+            plan = self._checked(path, began)
+            if plan is not None:
+                yield plan
             elif self.search.task is self.task:
                 # The hand did not find its way at a change of push: from now on changes have room to spare.
                 self.search = Search(careful(self.scene, self.task), self.scene.planning.seed)
                 break
         else:
             return
-        for path in self._rounds(began, self.search, unhindered):
-            found = self._checked(path, began)
-            if found is not None:
-                yield found
+        for path in self._rounds(began, self.search):
+            plan = self._checked(path, began)
+            if plan is not None:
+                yield plan
 
-    def _rounds(
-        self, began: float, search: Search, unhindered: Callable[[], Iterator[Sequence[Leg]]]
-    ) -> Iterator[Path]:
-        """Ways that are worth checking."""
+    def _rounds(self, began: float, search: Search) -> Iterator[Path]:
+        """Paths that are worth checking."""
         planning = self.scene.planning
-        asked, fresh = np.inf, True
+        given, fresh = np.inf, True
+        known, since = np.inf, 0  # a cost, and the work after which nothing much better was found
         for path in search.rounds():
-            clock = time.perf_counter() - began
+            spent = clock() - began
             if self.progress is not None:
-                self.progress(self.best, clock, search.nodes)
-            done = search.work >= WORK * planning.iterations or clock > planning.time_limit
-            worth = min(asked, self.best) * (1.0 if done else 1 - BETTER)
+                self.progress(self.best, spent, search.nodes)
+            if search.cost < known * (1 - BETTER):
+                known, since = search.cost, search.work
+            patience = np.inf if path is None else PATIENCE * planning.iterations
+            done = search.work >= WORK * planning.iterations or search.work - since >= patience
+            self.stopped_by = "time_limit" if spent > planning.time_limit else "iterations" if done else ""
+            done = bool(self.stopped_by)
+            worth = min(given, self.best) * (1.0 if done else 1 - BETTER)
             if path is not None and path.cost < worth:
-                asked = path.cost
+                given = path.cost
                 yield path
             if done:
                 return
             if fresh and path is not None and search.direct:
                 fresh = False
-                if self._free(search, unhindered):
-                    if search.best is not None and search.cost < min(asked, self.best):
+                if self._free(search):
+                    if search.best is not None and search.cost < min(given, self.best):
                         yield search.best
                     return
 
-    def _free(self, search: Search, unhindered: Callable[[], Iterator[Sequence[Leg]]]) -> bool:
+    def _free(self, search: Search) -> bool:
         """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
         clear = False
-        for done, legs in enumerate(unhindered()):
-            clear = search.offer(path_of(legs, self.options, self.task))
+        for done, found in enumerate(refined_paths(self.scene, self.task.fleet)):
+            clear = search.offer(found.path)
             if done > 0 and not clear:
                 return False
         return clear
 
-    def _checked(self, path: Path, began: float) -> tuple[float, Segments, dict[str, Any]] | None:
+    def _checked(self, path: Path, began: float) -> tuple[Found, Segments] | None:
         """The plan of a path, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.planning.clearance
         shorter = pruned(self.task, path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if shorter.cost < self.best else path
         try:
-            segments = assemble(scene, self.transits, legs_of(path, self.options))
+            segments = assemble(scene, self.transits, self.options, path)
         except FlatpushError as error:
             self.refused += 1
             self.complaint = f"{error}. "
@@ -133,8 +131,9 @@ class Around:
             return None
         self.best = path.cost
         if self._first is None:
-            self._first = time.perf_counter() - began
-        return path.cost, segments, {"first_path_time": self._first, "poses_searched": self.search.nodes}
+            self._first = clock() - began
+        details = {"first_path_time": self._first, "poses_searched": self.search.nodes}
+        return Found(path, path.cost, details), segments
 
     @property
     def tried(self) -> str:
