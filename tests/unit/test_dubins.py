@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flatpush.errors import InputError
-from flatpush.steering import dubins
+from flatpush.steering import dubins, shortest_word
 
 
 @pytest.mark.parametrize(
@@ -102,3 +102,20 @@ def test_the_compiler_is_not_loaded_for_one_path():
         "sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("radius", [1e-154, 1e10, 0.0, np.inf, np.nan, True, "1"])
+def test_radii_without_digits_are_refused(radius):
+    """1e-154 overflowed inside, and 1e10 took a goal beside the start for the start itself."""
+    with pytest.raises(InputError, match="the radius"):
+        dubins.shortest_path((0, 0, 0), (0, 1e-3, 0), radius)
+
+
+@pytest.mark.parametrize(
+    "pose", [(0, 0, "0"), (0, 0, True), np.ones(3, bool), ["a", "b", "c"], (10**400, 0, 0)]
+)
+def test_strings_and_booleans_are_no_numbers(pose):
+    with pytest.raises(InputError, match="numbers"):
+        dubins.shortest_path(pose, (1, 0, 0), 1.0)
+    with pytest.raises(InputError, match="3 numbers"):
+        shortest_word((0, 1), (0, -1), (1, 0), pose, (1, 0, 0))

@@ -48,7 +48,9 @@ def test_a_batch_is_as_good_as_its_single_plans(planner):
     for found, start in zip(batch, STARTS[:2], strict=True):
         alone = planner.plan(start)
         assert found.cost == pytest.approx(alone.cost, rel=0.005)
-        assert (found.run["rounds"], alone.run["rounds"]) == (1, 3)
+        assert found.scene.planning.iterations == 3300
+        assert found.run["rounds"] <= 1
+        assert alone.scene.planning == planner.scene.planning
         assert fp.verify(found).ok
 
 

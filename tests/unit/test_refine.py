@@ -306,3 +306,21 @@ def test_pool_seeds_are_the_best_over_their_poses(kind):
             assert seed.cost == pytest.approx(best[seed.key], rel=1e-9)
         assert seed.cost >= best[seed.key] * (1 - 1e-9)
         assert query.candidate(seed.pushes, seed.poses).cost <= seed.cost * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_replanning_costs_what_the_plain_words_cost(kind):
+    """Mean over the sixteen displacements; the first leg starts where it starts."""
+    fleet = KINDS[kind]
+    query = Query.of(fleet, np.array([0.06, 0.02, 2.6]), GOAL, 0.0)
+    switch = np.array([0.05, -0.03, 0.4])
+    found = query.candidate(np.array([0, 1]), np.array([query.start, switch, GOAL]))
+    turn = np.deg2rad(0.2)
+    displaced = [
+        switch + np.array([2e-4 * np.cos(a), 2e-4 * np.sin(a), sign * turn])
+        for a in np.arange(8) * np.pi / 4
+        for sign in (1, -1)
+    ]
+    second = np.mean([plain_leg(fleet, 1, pose, GOAL) for pose in displaced])
+    first = plain_leg(fleet, 0, query.start, switch)
+    assert query.replanning(found) == pytest.approx(first + second + fleet.switching[0, 1], rel=1e-9)

@@ -23,6 +23,9 @@ TURN = 2 * np.pi
 # A path is accepted if it ends within this of the goal, per (radius + city-block distance of start and goal).
 # The heading is always met. It lies above the rounding of sane input and below the 1e-9 that is promised.
 TOLERANCE = 4e-10
+# Radii that are told apart from nothing and from a straight line [m]: below, squares underflow; above, the tolerance
+# of where a path ends is more than a metre, so that poses beside each other would count as one.
+RADII = 1e-100, 1e9
 SENSE = {"L": 1.0, "S": 0.0, "R": -1.0}
 _MIRROR = str.maketrans("LR", "RL")
 
@@ -75,7 +78,8 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, radius: float) -> DubinsPat
         A path that ends within 1e-9 (radius + distance) of the goal, with no negative piece.
 
     Raises:
-        InputError: for poses of another shape or not finite, or a radius that is not positive and finite.
+        InputError: for poses of another shape or not finite, or a radius that is not positive and finite (from 1e-100
+            to 1e9 m).
 
     >>> path = shortest_path([0, 0, 0], [3, 0, 0], 1.0)
     >>> path.lengths.round(9).tolist()
@@ -171,10 +175,7 @@ def _poses(values: ArrayLike, name: str) -> Array:
 
 
 def _shaped_poses(values: ArrayLike, name: str) -> Array:
-    try:
-        poses = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: poses are numbers (x, y, heading)", value=values) from error
+    poses = numbers(values, f"{name}: poses are numbers (x, y, heading)")
     if poses.ndim == 0 or poses.shape[-1] != 3:
         raise InputError(f"{name}: poses have the shape (..., 3)", value=poses.shape)
     return poses
@@ -183,6 +184,31 @@ def _shaped_poses(values: ArrayLike, name: str) -> Array:
 def _checked_radius(radius: float) -> float:
     if isinstance(radius, bool) or not np.isscalar(radius) or not isinstance(radius, (int, float, np.number)):
         raise InputError("the radius is a number", value=radius)
-    if not (np.isfinite(radius) and radius > 0):
-        raise InputError("the radius is positive and finite [m]", value=radius)
+    if not RADII[0] <= radius <= RADII[1]:
+        raise InputError(
+            f"the radius is positive and finite [m], from {RADII[0]:g} to {RADII[1]:g}", value=radius
+        )
     return float(radius)
+
+
+def numbers(values: ArrayLike, rule: str) -> Array:
+    """An array of numbers; strings and booleans are none.
+
+    Raises:
+        InputError: with the rule, for anything else.
+    """
+    try:
+        found = np.asarray(values)
+        mixed = found.dtype.kind in "iuf" and not isinstance(values, np.ndarray) and _has_truth(values)
+        if found.dtype.kind not in "iuf" or mixed:
+            raise TypeError(f"{found.dtype} is no number")
+        return found.astype(float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(rule, value=values) from error
+
+
+def _has_truth(values: object) -> bool:
+    """Whether True or False stands somewhere in nested sequences, where numpy makes a number of it."""
+    if isinstance(values, (list, tuple)):
+        return any(_has_truth(value) for value in values)
+    return isinstance(values, (bool, np.bool_))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,7 +75,7 @@ class Fleet:
     def size(self) -> int:
         return len(self.left)
 
-    @property
+    @cached_property
     def radius(self) -> Array:
         """Turning radii of the flat points, shape (k,)."""
         return 0.5 * np.linalg.norm(self.left - self.right, axis=1)
@@ -89,7 +90,7 @@ class Fleet:
         """Angle from O's +x to the straight direction, shape (k,) [rad]."""
         return np.arctan2(self.direction[:, 1], self.direction[:, 0])
 
-    @property
+    @cached_property
     def is_dubins(self) -> bool:
         """Whether every car is a Dubins car of its flat point and the cost is the flat point's path."""
         span = self.left - self.right

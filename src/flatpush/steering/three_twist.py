@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
+from .dubins import numbers
 
 TURN = 2 * math.pi
 TOLERANCE = (
@@ -189,10 +190,7 @@ def _checked_car(c_left: ArrayLike, c_right: ArrayLike, direction: ArrayLike) ->
 
 
 def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    try:
-        vector = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} is {size} numbers", value=value) from error
+    vector = numbers(value, f"{name} is {size} numbers")
     if vector.shape != (size,) or not np.isfinite(vector).all():
         raise InputError(f"{name} is {size} finite numbers", value=value)
     return vector

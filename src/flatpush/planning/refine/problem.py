@@ -1,6 +1,7 @@
 """A query as the refinement sees it: the fleet as records, the two ends, what a sequence of pushes costs."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class Query:
     goal: Array
     least: float
     cars: Records
+    changes: list[list[float]]
     offsets: Array
     flat: bool
 
@@ -51,10 +53,12 @@ class Query:
         ring = np.column_stack([OFFSET * np.cos(around), OFFSET * np.sin(around)])
         signs = np.repeat([OFFSET_ANGLE, -OFFSET_ANGLE], 8)
         offsets = np.column_stack([np.tile(ring, (2, 1)), signs])
-        return cls(fleet, start, goal, least, fleet.cars, offsets, fleet.is_dubins)
+        changes = fleet.switching.tolist()
+        return cls(fleet, start, goal, least, fleet.cars, changes, offsets, fleet.is_dubins)
 
     def switching(self, pushes: np.ndarray) -> float:
-        return float(np.sum(self.fleet.switching[pushes[:-1], pushes[1:]]))
+        sequence = pushes.tolist()
+        return sum((self.changes[a][b] for a, b in pairwise(sequence)), 0.0)
 
     def chain(self, pushes: np.ndarray, poses: Array) -> tuple[float, Records]:
         """Cost of the legs between poses without switching, and their words, records of six_words.WORD, shape (n,)."""
@@ -71,6 +75,8 @@ class Query:
     def merged(self, pushes: np.ndarray, poses: Array) -> Candidate:
         """The same, equal neighbours being joined to one leg."""
         same = np.flatnonzero(pushes[1:] == pushes[:-1])
+        if len(same) == 0:
+            return self.candidate(pushes, np.ascontiguousarray(poses))
         return self.candidate(
             np.delete(pushes, same), np.ascontiguousarray(np.delete(poses, same + 1, axis=0))
         )
