@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array
@@ -43,18 +44,18 @@ class Context:
     def length_unit(self) -> str:
         return next(unit for unit, per_metre in PER_METRE.items() if per_metre == self.per_metre)
 
-    def lengths(self, values: Any) -> Array:
+    def lengths(self, values: ArrayLike) -> Array:
         # A quotient, which is the nearest float for whole numbers; 9 * 0.001 is not 0.009.
         return np.array(values, dtype=float) / self.per_metre
 
     def angle(self, value: float) -> float:
         return float(np.deg2rad(value)) if self.degrees else value
 
-    def refuse(self, rule: str, key: str, *, hint: str, value: Any = None) -> InputError:
+    def refuse(self, rule: str, key: str, *, hint: str, value: object = None) -> InputError:
         shown = self.value(key) if value is None else value
         return InputError(rule, source=self.source, key=join(self.prefix, key), value=shown, hint=hint)
 
-    def value(self, key: str) -> Any:
+    def value(self, key: str) -> object:
         steps: list[str | int] = []
         for part in key.split("."):
             name, *places = part.split("[")

@@ -13,7 +13,7 @@ from ..problem.frame import far_origin
 from . import scene_model as m
 from .context import PER_METRE, Context
 from .push_reader import open_polygon
-from .reading import plain, read_mapping
+from .reading import read_mapping
 from .refusals import checked
 from .shapes import Choice, DrawnOutline, load_drawing
 
@@ -83,7 +83,7 @@ def outline_note(path: str | os.PathLike[str]) -> OutlineNote | None:
         InputError: as load_scene.
     """
     source = os.fspath(path)
-    raw = plain(read_mapping(path), source)
+    raw = read_mapping(path)
     model = checked(m.SceneModel, raw, source)
     ctx = Context(source, "", raw, PER_METRE[model.units.length], model.units.angle == "deg")
     form = model.object.outline

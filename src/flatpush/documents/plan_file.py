@@ -69,7 +69,7 @@ def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:
         InputError: as load_plan.
     """
     raw = plain(document, source)
-    version = raw.get("flatpush")
+    version = raw.get("flatpush") if isinstance(raw, dict) else None
     if version != "plan/1":
         hint = "Is it a plan? flatpush plan SCENE -o FILE writes one."
         if isinstance(version, str) and version.startswith("scene/"):

@@ -30,7 +30,7 @@ _WORDS |= dict.fromkeys(("", "~", "null", "Null", "NULL"))
 _WORDS |= dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan"))
 
 
-def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[str, Any]:
+def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[str, object]:
     """The document in a YAML or JSON file, as plain values in the file's own units, not checked further.
 
     A file named .json is read as JSON, one named .yaml or .yml as YAML; of others, one that begins with a
@@ -96,7 +96,7 @@ def read_bytes(path: str | os.PathLike[str], most: int = MOST_BYTES) -> bytes:
     return content
 
 
-def plain(value: Any, source: str = "", key: str = "", level: int = 0) -> Any:
+def plain(value: object, source: str = "", key: str = "", level: int = 0) -> object:
     """The value with tuples and NumPy arrays as lists, NumPy scalars as numbers, mappings as dicts."""
     if level > MOST_LEVELS:
         raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=key)

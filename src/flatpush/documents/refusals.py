@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from ..errors import InputError
 from .reading import join
@@ -13,7 +14,7 @@ from .reading import join
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def checked(model: type[Model], document: Any, source: str = "", prefix: str = "") -> Model:
+def checked(model: type[Model], document: object, source: str = "", prefix: str = "") -> Model:
     """The document as a model.
 
     Raises:
@@ -28,7 +29,7 @@ def checked(model: type[Model], document: Any, source: str = "", prefix: str = "
 
 
 def refusal(
-    model: type[BaseModel], errors: Sequence[Any], document: Any, source: str, prefix: str
+    model: type[BaseModel], errors: Sequence[ErrorDetails], document: object, source: str, prefix: str
 ) -> InputError:
     error = errors[0]
     steps = _steps(error["loc"])
@@ -47,11 +48,11 @@ def refusal(
     return InputError(rule, source=source, key=_path(steps, prefix), value=value, hint=hint)
 
 
-def value_at(document: Any, steps: Sequence[str | int]) -> Any:
+def value_at(document: object, steps: Sequence[str | int]) -> object:
     """What stands at a path of a document; None if nothing does."""
     for step in steps:
         try:
-            document = document[step]
+            document = document[step]  # type: ignore[index]
         except (KeyError, IndexError, TypeError):
             return None
     return document
@@ -81,13 +82,13 @@ def descriptions(schema: dict[str, Any]) -> dict[str, str]:
     return found
 
 
-def nearest(word: Any, known: Sequence[str]) -> str:
+def nearest(word: object, known: Sequence[str]) -> str:
     """A hint that names the nearest of the known words, or all of them."""
     close = get_close_matches(str(word), known, 1, 0.6)
     return f"Did you mean {close[0]!r}?" if close else f"Known keys: {', '.join(known)}."
 
 
-def _rule(error: Any) -> tuple[str, str]:
+def _rule(error: ErrorDetails) -> tuple[str, str]:
     """The rule that is broken, and a hint that goes beyond the description of the key."""
     kind, ctx, value = error["type"], error.get("ctx", {}), error.get("input")
     if kind == "unknown_key":

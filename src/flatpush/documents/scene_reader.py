@@ -62,8 +62,7 @@ def parse_scene(document: Mapping[str, Any], source: str = "", key: str = "") ->
     >>> scene.object.outline.radius, scene.start.tolist()
     (0.04, [0.06, 0.02, 3.141592653589793])
     """
-    raw = plain(document, source, key)
-    _check_version(raw, source, key)
+    raw = _checked_version(plain(document, source, key), source, key)
     model = checked(m.SceneModel, raw, source, key)
     return _scene(Context(source, key, raw, PER_METRE[model.units.length], model.units.angle == "deg"), model)
 
@@ -76,7 +75,7 @@ def _merged(document: Any, changes: Mapping[str, Any]) -> Any:
     return result
 
 
-def _check_version(raw: Any, source: str, key: str) -> None:
+def _checked_version(raw: object, source: str, key: str) -> dict[str, Any]:
     if not isinstance(raw, dict):
         raise InputError("a scene is a mapping of keys to values", source=source, key=key, value=raw)
     if "flatpush" not in raw:
@@ -94,6 +93,7 @@ def _check_version(raw: Any, source: str, key: str) -> None:
         raise InputError(
             "this flatpush reads scene/1", source=source, key=join(key, "flatpush"), value=version, hint=hint
         )
+    return raw
 
 
 def _scene(ctx: Context, model: m.SceneModel) -> Scene:
