@@ -35,6 +35,8 @@ from flatpush.problem import (
 from flatpush.simulation.study import Noise, Runs
 from flatpush.view import PushSketch, check_figure, describe_figure, palette, save_figure, save_snapshots
 from flatpush.view.drawing import Disc, Drawing, Line, Text
+from flatpush.view.labels import Labels
+from flatpush.view.page import draw_page
 from flatpush.view.panel import Panel, frame_for
 from flatpush.view.plan_figure import cone_length, draw_plan
 from flatpush.view.push_figure import draw_sketches, sense
@@ -284,6 +286,16 @@ def test_no_two_labels_of_many_pushes_overlap_and_all_are_on_the_page(turns):
             assert not boxes_overlap(text.box, other.box), (text.text, other.text)
 
 
+def test_a_label_gives_way_to_one_that_is_there_and_to_what_is_drawn():
+    panel = Panel(Drawing(200, 200, ""), (0.0, 0.0, 200.0, 200.0), (0.0, 0.0, 200.0, 200.0))
+    labels = Labels(panel, np.array([[100.0, 60.0]]))
+    offered = [np.array([100.0, y]) for y in (100.0, 104.0, 140.0, 180.0)]
+    np.testing.assert_array_equal(labels.place(20, 10, offered), offered[0])
+    # 104 lies on the first label, 140 (60 mm from below) on what is drawn.
+    np.testing.assert_array_equal(labels.place(20, 10, offered), offered[3])
+    np.testing.assert_array_equal(labels.place(20, 10, offered, free=True), offered[2])
+
+
 def test_the_box_of_a_text_is_what_its_letters_cover():
     """Measured in the picture itself: dark pixels lie in the box, and reach its ends."""
     for upright in (False, True):
@@ -338,6 +350,15 @@ def test_the_title_says_what_happens():
     way = np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1))
     assert plan_title(plan) == f"triangle: 9 pushes, {way:.2f} m, {plan.duration:.0f} s"
     assert travel(plan) == pytest.approx(way, rel=1e-3)  # chords of a sampled path
+    # The same pushes of an object whose drawing has its origin elsewhere.
+    aside = replace(
+        plan.scene.object, outline=Outline.polygon(TRIANGLE + np.array([0.05, 0.02])), support="uniform"
+    )
+    moved = replace(plan, scene=replace(plan.scene, object=aside, pushes="auto"))
+    line = transform(np.concatenate([push.object for push in plan.pushes]), aside.cof)
+    way_aside = np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1))
+    assert travel(moved) == pytest.approx(way_aside, rel=1e-3)
+    assert abs(way_aside - way) > 0.01 * way  # far more than the tolerance
 
 
 def test_cones_stay_inside_the_object():
@@ -406,6 +427,14 @@ def test_html_stands_alone_and_plays_the_plan(tmp_path):
     np.testing.assert_allclose(turns[0]["centre"], 1e3 * transform(plan.scene.start_pose, LEFT), atol=1e-3)
     assert turns[-1]["end"] == pytest.approx(line.starts[2] + 9.0)
     assert "$" not in page
+
+
+def test_a_pusher_that_moves_alone_shows_the_fingers_of_the_push_it_goes_to():
+    plan = make_plan(pushes=2)
+    single = replace(plan.pushes[1], fingers=np.zeros((1, 2)))
+    segments = tuple(single if s is plan.pushes[1] else s for s in plan.segments)
+    data = page_data(draw_page(replace(plan, segments=segments)))
+    assert [len(s["tips"]) for s in data["segments"]] == [2, 2, 2, 1, 1, 1, 1, 1]
 
 
 def test_names_cannot_break_out_of_the_page_or_the_picture(tmp_path):
