@@ -31,8 +31,6 @@ LONG = {
     "control.laws.rollout_kernel.many",
     "planning.graph.kernels._bound",
     "planning.graph.kernels.delayed_bound",
-    "simulation.plant.kernels._contacts",
-    "simulation.plant.kernels.many",
     "steering.kernels.three_twist_between",
     "steering.kernels.timed_between",
 }
