@@ -324,3 +324,14 @@ def test_replanning_costs_what_the_plain_words_cost(kind):
     second = np.mean([plain_leg(fleet, 1, pose, GOAL) for pose in displaced])
     first = plain_leg(fleet, 0, query.start, switch)
     assert query.replanning(found) == pytest.approx(first + second + fleet.switching[0, 1], rel=1e-9)
+
+
+def test_the_descent_ends_at_the_minimum():
+    """Going on for thousands of steps gains less than 1e-9; without the curvature of the chain in the Hessian 4e-8."""
+    fleet, rng = KINDS["general"], np.random.default_rng(10)
+    for start in random_poses(rng, 10):
+        query = Query.of(fleet, start, GOAL, 0.0)
+        seed = pool_seeds(query, sample_poses(query, rng, 200, []), 3)[0]
+        found = query.descend(seed, 6, 80)
+        longer = min(query.descend(found, 6, 4000).cost, query.descend(seed, 12, 4000).cost)
+        assert found.cost <= longer * (1 + 1e-9)
