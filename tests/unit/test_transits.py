@@ -57,6 +57,15 @@ def test_around_a_concave_object_without_touching_it(fingers):
             assert gaps(scene, inner, tips).min() > 0.9e-3
 
 
+def test_around_the_object_the_fingers_keep_the_clearance_of_the_scene():
+    """The scene's clearance of 5 mm, not only the least gap of 1 mm; a little more, since corners are chords."""
+    scene = scene_of(L_SHAPE)
+    scene = replace(scene, planning=fp.Planning(clearance=0.005))
+    first, second, *_ = placements(scene)
+    inner = replace_ends(Transits(scene).between(first, second))
+    assert 0.0049 < gaps(scene, inner, np.zeros((1, 2))).min() < 0.0052
+
+
 def replace_ends(way):
     """Without the straight stretches that leave and reach the contacts."""
     return replace(way, poses=way.poses[1:-1], heights=way.heights[1:-1])
