@@ -10,11 +10,11 @@ from tests.unit.test_control import PERFECT
 
 import flatpush as fp
 from flatpush.cli.app import app
-from flatpush.control import Measurement, SimulatedSensor
+from flatpush.control import Camera, Measurement, SimulatedSensor
 from flatpush.control.loop.closed_loop import drive
-from flatpush.control.tracking.plan_controller import PlanController
-from flatpush.control.tracking.simulated_run import goal_error
-from flatpush.geometry import compose
+from flatpush.control.tracking.plan_controller import PlanController, goal_error
+from flatpush.control.tracking.simulated_run import TrackedRun
+from flatpush.geometry import compose, transform
 from flatpush.simulation.plant import Plant
 
 
@@ -41,11 +41,16 @@ def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     assert "arrived" in text
     assert "sticking" in text
     assert figure.read_bytes().lstrip().startswith(b"<")
-    assert call("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json") == 0
+    again = ("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json")
+    assert call(*again, "--tolerance", "3,3") == 0
     first = json.loads(capsys.readouterr().out)
-    assert call("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json") == 0
-    assert json.loads(capsys.readouterr().out) == first
     assert first["outcome"] == "arrived"
+    assert first["distance"] < 0.003
+    assert call(*again, "--tolerance", "3,3") == 0
+    assert json.loads(capsys.readouterr().out) == first
+    assert call(*again, "--tolerance", "0.001,0.001") == 3
+    beside = json.loads(capsys.readouterr().out)
+    assert beside["outcome"].startswith(f"ended beside the goal: {1000 * beside['distance']:.2f} mm")
 
 
 def test_what_makes_no_sense_is_refused(plan):
@@ -68,13 +73,13 @@ def test_what_makes_no_sense_is_refused(plan):
         call("track", path, "--controller", "dfl", "--rate", "10", "--frequency", "30")
 
 
-def drives(plan, law, start, **options):
+def drives(plan, law, start, camera=PERFECT, duration=None, **options):
     controller = PlanController.of(plan, law, **options)
     first = plan.pushes[0]
     plant = Plant(plan.scene.object, first.fingers, plan.scene.pusher.tip_radius)
     hand = first.pusher[0] - np.array([0.0, 0.03, 0.0])
-    sensor = SimulatedSensor(PERFECT, np.random.default_rng(0))
-    return drive(controller, plant, start, hand, sensor, 3 * plan.duration)
+    sensor = SimulatedSensor(camera, np.random.default_rng(0))
+    return drive(controller, plant, start, hand, sensor, duration or 3 * plan.duration)
 
 
 def test_what_the_path_law_follows_exactly_ends_at_the_goal(plan):
@@ -94,7 +99,7 @@ def test_with_the_plan_s_time_law_the_pusher_keeps_to_the_plan(plan):
     assert distance < 5e-5
     assert np.rad2deg(turn) < 0.05
     pushing = [k for k, mode in enumerate(run.modes) if mode in ("path", "saturated")]
-    assert (pushing[-1] - pushing[0]) / 60 == pytest.approx(plan[0].pushes[0].times[-1], rel=0.02)
+    assert (pushing[-1] - pushing[0]) / 60 == pytest.approx(plan[0].pushes[0].times[-1], rel=0.05)
     velocity = 60 * np.diff(run.pusher[pushing][:, :2], axis=0)
     pusher = plan[0].scene.pusher
     assert np.max(np.hypot(*velocity.T)) < 1.001 * pusher.speed
@@ -128,11 +133,71 @@ def test_a_finger_that_has_lost_the_object_stops(plan):
 def test_frames_of_before_the_pusher_went_on_are_no_news(plan):
     controller = PlanController.of(plan[0], "path")
     frame = Measurement(0.0, np.asarray(plan[0].scene.start_pose), np.array([-0.1, 0.0, 0.0]))
-    state, _ = controller.step(controller.start(), frame, 0.1)
-    state = replace(state, newest=0.05)
-    after, _ = controller.step(state, replace(frame, time=0.02, object=np.array([0.1, 0.1, 1.0])), 0.11)
-    assert after.mode == "transit"
-    np.testing.assert_allclose(after.inner, state.inner)
+    state, _ = controller.step(controller.start(0.05), frame, 0.1)
+    assert state.phase.poses == ()
+    state, _ = controller.step(state, replace(frame, time=0.06), 0.11)
+    np.testing.assert_allclose(state.phase.poses, [frame.object])
+
+
+@pytest.mark.parametrize(("frames", "noise"), [(15, 0.3), (60, 0.3), (120, 1.0)])
+def test_it_lands_whatever_the_camera(plan, frames, noise):
+    """The place to land at is the mean of what was seen at rest, so that it does not run away with the noise."""
+    camera = Camera(rate=frames, position=noise / 1000, angle=np.deg2rad(noise))
+    run = TrackedRun(camera=camera, seed=1).of(plan[0])
+    assert "path" in run.modes
+    assert not run.outcome.startswith("out of time")
+
+
+def test_out_of_time_says_what_it_was_doing(plan):
+    run = drives(plan[0], "path", plan[0].scene.start_pose, camera=Camera(rate=2.0), duration=3.0)
+    assert run.outcome.startswith("out of time after 3.0 s, looking: looking at the object")
+
+
+def test_a_push_of_one_sample_is_refused(plan):
+    (push,) = plan[0].pushes
+    still = replace(push, times=push.times[:1], object=push.object[:1], pusher=push.pusher[:1], arcs=())
+    segments = tuple(still if s is push else s for s in plan[0].segments)
+    with pytest.raises(fp.InputError, match="has no motion"):
+        PlanController.of(replace(plan[0], segments=segments))
+
+
+def used(plan, run, rate=60.0):
+    """The largest shares of the limits on speed and acceleration, on the table and in the air, and of the turn rate."""
+    pusher, dt = plan.scene.pusher, 1 / rate
+    height = np.concatenate([[0.0], run.heights[:-1]])
+    tips = np.array([transform(pose, plan.pushes[0].fingers) for pose in run.pusher])
+    tips = np.concatenate([tips, np.repeat(height[:, None, None], tips.shape[1], axis=1)], axis=2)
+    speeds = np.diff(tips, axis=0) / dt
+    speed = np.max(np.linalg.norm(speeds, axis=2), axis=1)
+    acceleration = np.max(np.linalg.norm(np.diff(speeds, axis=0) / dt, axis=2), axis=1)
+    up = (height[1:] > 0) | (height[:-1] > 0)
+    either = up[1:] | up[:-1]
+    return {
+        "speed": np.max(speed[~up], initial=0) / pusher.speed,
+        "acceleration": np.max(acceleration[~either], initial=0) / pusher.acceleration,
+        "travel_speed": np.max(speed[up], initial=0) / pusher.travel_speed,
+        "travel_acceleration": np.max(acceleration[either], initial=0) / pusher.travel_acceleration,
+        "turn_rate": np.max(np.abs(np.diff(run.pusher[:, 2]))) / dt / pusher.turn_rate,
+    }
+
+
+@pytest.mark.parametrize("law", ["path", "dfl", "horizon"])
+def test_every_limit_is_kept_with_noise(plan, law):
+    """By the differences of where the fingertips were at the ticks."""
+    run = TrackedRun(law, start=(0.0005, 0.0, 0.01), seed=2).of(plan[0])
+    shares = used(plan[0], run)
+    assert all(share <= 1.000001 for share in shares.values()), shares
+    assert min(shares["speed"], shares["travel_speed"]) > 0.9  # and they are used
+
+
+def test_two_fingers_carry_the_object_without_sliding(two_finger_plan):
+    run = TrackedRun(camera=PERFECT).of(two_finger_plan)
+    assert run.outcome == "arrived"
+    assert not any(mode.startswith("sliding") for mode in run.contacts)
+    distance, turn = goal_error(two_finger_plan, run.object[-1])
+    assert distance < 5e-5
+    assert np.rad2deg(turn) < 0.05
+    assert all(share <= 1.000001 for share in used(two_finger_plan, run).values())
 
 
 def test_a_bad_frame_on_the_way_to_the_object_stops_the_pusher(plan):

@@ -55,9 +55,12 @@ def test_a_contact_that_cannot_turn_both_ways_has_no_car():
 
 @pytest.mark.parametrize("number", [0, 3])
 def test_on_the_exact_surface_it_is_fitted_to_the_turning_centres_and_the_drift(number):
-    scene = task(number).scene
+    scene, fitted = task(number).scene, 0
     for push in scene.pushes:
         option = push_option(scene, push)
+        if option.car is None:
+            continue
+        fitted += 1
         car, known = option.car, steering_of(scene, option, 0.2)
         found = contact_car(
             known.point, option.placement.normals[0], known.cof, known.rho, scene.object.friction, 0.0025,
@@ -75,6 +78,7 @@ def test_on_the_exact_surface_it_is_fitted_to_the_turning_centres_and_the_drift(
         assert np.max(np.abs(drift)) < 0.15
         rho, sides = sides_of(car, scene.object.friction, scene.planning.friction_margin)
         assert (rho, sides) == (known.rho, known.sides)
+    assert fitted >= 2
 
 
 # The rest of the path -------------------------------------------------------------------------------------------------
@@ -316,33 +320,44 @@ def pushing():
     return controller, kept["state"], kept["time"]
 
 
+def slower(controller, before, command):
+    """Whether a command brakes as hard as the pusher may, or stands."""
+    speeds = [np.hypot(*u.velocity[:2]) for u in (before, command)]
+    step = controller.scene.pusher.acceleration / controller.rate
+    return speeds[1] == 0 or speeds[1] <= speeds[0] - 0.99 * step
+
+
 def test_what_was_not_measured_well_stops_the_pusher():
     controller, state, now = pushing()
-    good = state.newest
-    dt = 1 / controller.rate
+    good, dt = state.seen.frame, 1 / controller.rate
     bad = {
         "not finite": replace(good, time=now, object=np.array([0.0, np.nan, 0.0])),
         "another object": replace(good, time=now, body="cup"),
         "no newer": replace(good, time=good.time),
         "ahead of now": replace(good, time=now + 1.0),
+        "an outlier: the object": replace(good, time=now, object=good.object + np.array([0.03, 0.0, 0.0])),
+        "an outlier: the hand": replace(good, time=now, pusher=good.pusher + np.array([0.0, 0.03, 0.0])),
     }
     for why, frame in bad.items():
         held, command = controller.step(state, frame, now + dt)
         assert held.mode == "held"
         assert why in held.note
-        assert not command.velocity.any()
+        assert slower(controller, state.seen.last, command)
         # The next good frame takes it on.
         on, command = controller.step(held, Measurement(now, good.object, good.pusher), now + 2 * dt)
         assert on.mode == "push"
         assert command.velocity.any()
     late, command = controller.step(state, None, now + 2.0)
     assert late.mode == "waiting"
-    assert not command.velocity.any()
+    assert slower(controller, state.seen.last, command)
     old, command = controller.step(state, replace(good, time=now + 0.1), now + 2.0)
     assert old.mode == "held"
-    assert not command.velocity.any()
+    assert slower(controller, state.seen.last, command)
     lost, command = controller.step(state, None, np.nan)
     assert lost.mode == "held"
+    for _ in range(30):
+        assert slower(controller, state.seen.last, command) or not command.velocity.any()
+        lost, command = controller.step(lost, None, np.nan)
     assert not command.velocity.any()
 
 
@@ -353,7 +368,7 @@ def test_commands_are_finite_wherever_the_object_jumps_to():
         jump = Measurement(now + k / 60, rng.normal(size=3) * [0.2, 0.2, 2], rng.normal(size=3) * 0.2)
         state, command = controller.step(state, jump, now + k / 60)
         assert np.all(np.isfinite(command.velocity))
-        assert np.hypot(*command.velocity[:2]) <= 5 * controller.scene.pusher.speed * (1 + 1e-9)
+        assert np.hypot(*command.velocity[:2]) <= controller.scene.pusher.travel_speed * (1 + 1e-6)
 
 
 def test_what_makes_no_sense_is_refused():

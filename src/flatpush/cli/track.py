@@ -41,13 +41,17 @@ def command(
     frequency: Annotated[float, typer.Option(help="dfl: natural frequency [rad/s].")] = 2.0,
     damping: Annotated[float, typer.Option(help="dfl: damping ratio.")] = 1.0,
     learn: Annotated[bool, typer.Option("--learn", help="Learn the steering while pushing.")] = False,
+    tolerance: Annotated[
+        str | None, typer.Option(help="It arrives within MM,DEG of the goal; default: the scene's.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
     figure: Annotated[Path | None, typer.Option(help="Draw the run: .svg or .png.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Follow PLAN under feedback, in the contact simulator with a simulated camera."""
-    from ..control import Camera
-    from ..control.tracking.simulated_run import TrackedRun, goal_error
+    from ..control import ARRIVED, Camera
+    from ..control.tracking.plan_controller import goal_error
+    from ..control.tracking.simulated_run import TrackedRun
     from ..documents import check_outputs, load_plan
 
     if controller not in CONTROLLERS:
@@ -58,6 +62,7 @@ def command(
         raise InputError("--seed is 0 or more", value=seed)
     if friction is not None and not (math.isfinite(friction) and friction >= 0):
         raise InputError("friction is a finite number, 0 or more", key="--friction", value=friction)
+    within = None if tolerance is None else numbers(tolerance, 2, "--tolerance")
     spread, shift, off = (
         numbers(noise, 2, "--noise") or [],
         numbers(centre, 2, "--centre") or [],
@@ -75,6 +80,7 @@ def command(
         (shift[0] / 1000, shift[1] / 1000),
         (off[0] / 1000, off[1] / 1000, math.radians(off[2])),
         seed,
+        None if within is None else (within[0] / 1000, math.radians(within[1])),
     )
     loaded = load_plan(plan)
     warn_unverified(loaded)
@@ -107,7 +113,7 @@ def command(
         print_json(result)
     else:
         _tell(result, run, figure)
-    return 0
+    return 0 if run.outcome == ARRIVED else 3
 
 
 def _progress(planned: float, rate: float) -> Callable[[float, ControllerState], None]:

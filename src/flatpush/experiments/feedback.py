@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..control import Camera, SimulatedSensor
+from ..control import AbstractController, Camera, SimulatedSensor
 from ..control.horizon.controller import HorizonController
 from ..control.loop.closed_loop import ClosedLoopRun, drive
 from ..control.tracking.plan_controller import PlanController
@@ -181,7 +181,7 @@ class DisturbedPlant(Plant):
         return super().step(self.start(state.object, [*moved, state.hand[2]]), velocity, dt)
 
 
-def controlled(law: Law, learn: bool, scene: Scene, rate: float) -> HorizonController | PlanController:
+def controlled(law: Law, learn: bool, scene: Scene, rate: float) -> AbstractController:
     """The controller of a law for a task."""
     if law == "horizon":
         return HorizonController.of(scene, rate=rate, learn=learn)

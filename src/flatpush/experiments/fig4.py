@@ -127,7 +127,7 @@ def learned_bias(r: float) -> float:
     run = drive(
         controller, plant, np.zeros(3), compose(np.zeros(3), model.pusher),
         SimulatedSensor(Camera(1e6, 0, 0, 0), np.random.default_rng(0)), 25.0,
-        told=lambda _, state: last.append(state.model),
+        told=lambda _, state: last.append(state.controller.model),
     )  # fmt: skip
     return float(wrap_angle(last[-1].flat_of(run.object[-1])[2] - heading))
 

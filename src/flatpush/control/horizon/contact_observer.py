@@ -1,7 +1,6 @@
 """What the horizon controller makes of what it sees: the contact and its car, where the object is, what steers it."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from ...geometry import Outline, perpendicular, pose_error, relative, transform,
 from ...geometry.pose import Array
 from ...problem import Scene
 from ..learning.belief import sticking_displacement
-from ..loop.frames import after
 from ..loop.measurement import Measurement
 from .contact_car import ContactCar, contact_car
 from .push_knowledge import shared
@@ -47,14 +45,14 @@ class ContactObserver:
 
     def seen(self, state: HorizonState, frame: Measurement) -> HorizonState:
         """The state after a frame that is good."""
-        before = state.seen.frame
+        before = state.believed
         if state.phase != "push" or state.car is None or before is None or state.tip is None:
             if state.phase == "look" and frame.time >= state.since - 1e-9:
                 state = replace(state, frames=(*state.frames, np.asarray(frame.object, dtype=float)))
             if state.phase == "resume":
                 # While the finger is off the object this rests: the frames are averaged.
                 state = replace(state, frames=(*state.frames, np.asarray(frame.object, dtype=float)))
-            return replace(state, seen=after(state.seen, frame))
+            return replace(state, believed=frame)
         model, dt = state.car.model, frame.time - before.time
         u = (np.asarray(frame.pusher, dtype=float) - before.pusher) / dt
         x, y, turn = (float(v) for v in before.object)
@@ -65,7 +63,7 @@ class ContactObserver:
         believed = np.array([x, y, turn]) + innovation * (POSITION_GAIN, POSITION_GAIN, ANGLE_GAIN)
         believed = self._at_edge(state.car, believed, np.asarray(frame.pusher, dtype=float))
         tip = state.tip + PLACE_GAIN * (relative(frame.object, frame.pusher)[:2] - state.tip)
-        state = replace(state, tip=tip, seen=after(state.seen, replace(frame, object=believed)))
+        state = replace(state, tip=tip, believed=replace(frame, object=believed))
         if state.window is not None:
             window = self.along(
                 state, state.window, before, np.asarray(frame.pusher, dtype=float), believed[2]
@@ -152,9 +150,3 @@ def nearest_contact(outline: Outline, tip: ArrayLike) -> tuple[Array, Array, flo
     if found.corner and found.distance > 1e-9:
         normal = (found.point - p) / found.distance
     return found.point, normal, found.distance
-
-
-def mean_pose(poses: Sequence[Array]) -> Array:
-    """The mean of poses that lie near to each other."""
-    first = np.asarray(poses[0], dtype=float)
-    return np.asarray(first + np.mean([pose_error(p, first) for p in poses], axis=0))

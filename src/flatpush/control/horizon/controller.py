@@ -14,10 +14,11 @@ from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
-from ..loop.frames import Seen, predicted, refusal, with_command
-from ..loop.measurement import STOP, Command, Measurement
+from ..loop.frames import hand, mean_pose, predicted
+from ..loop.limits import Limits, braking
+from ..loop.measurement import Command, Measurement
 from .contact_car import ContactCar
-from .contact_observer import EDGE, LOST, ContactObserver, mean_pose, nearest_contact
+from .contact_observer import EDGE, LOST, ContactObserver, nearest_contact
 from .landings import next_push
 from .push_knowledge import Steering, shared, steering_of
 from .rest_of_path import rest_of_path
@@ -26,6 +27,8 @@ from .state import HorizonState, LearningWindow
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
 # friction that is a fifth less than believed.
 RESERVE = 0.4
+# The share of the acceleration that is planned with for coming to rest.
+BRAKE = 0.6
 # Frames averaged over an object at rest.
 FRAMES = 10
 # The share of the tolerance that an average of these frames has to keep.
@@ -57,7 +60,7 @@ class HorizonController(AbstractController[HorizonState]):
         tolerance: it arrives within this distance [m] and angle [rad] of the goal.
         landings: at most so many, then it gives up and says how far off it is.
         learn: whether the steering is learned while the finger sticks.
-        body, stale: as for PathController.
+        body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
     """
 
@@ -71,6 +74,11 @@ class HorizonController(AbstractController[HorizonState]):
     body: str = ""
     stale: float = 0.5
     sd: float = float(np.deg2rad(0.3))
+    noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
+
+    @cached_property
+    def limits(self) -> Limits:  # type: ignore[override]
+        return Limits.of(self.scene.pusher, np.zeros((1, 2)), self.scene.object.outline.size)
 
     def __post_init__(self) -> None:
         for name in ("rate", "stale", "sd"):
@@ -146,28 +154,16 @@ class HorizonController(AbstractController[HorizonState]):
             raise InputError("a time is finite", value=time)
         return HorizonState(since=time, steering=self.prior, failures=(0,) * len(self.prior))
 
-    def step(
-        self, state: HorizonState, measurement: Measurement | None, time: float
-    ) -> tuple[HorizonState, Command]:
-        if state.outcome:
-            return state, STOP
-        if not np.isfinite(time):
-            return replace(state, mode="held", note="the time is not finite"), STOP
-        if measurement is not None:
-            wrong = refusal(measurement, Seen(state.newest), time, self.body, self.stale)
-            if wrong:
-                return self._stopped(state, time, "held", wrong)
-            state = replace(state, newest=measurement)
-            # At a landing all is known as of then; what was exposed before and comes late is no news.
-            if state.seen.frame is None or measurement.time > state.seen.frame.time:
-                state = self.observer.seen(replace(state, expected=None), measurement)
-        frame = state.newest
-        if frame is None:
-            return self._stopped(state, time, "waiting", "no measurement yet")
-        if time - frame.time > self.stale:
-            return self._stopped(
-                state, time, "waiting", f"the last measurement is {time - frame.time:.3g} s old"
-            )
+    def noticed(self, state: HorizonState, frame: Measurement) -> HorizonState:
+        # At a landing all is known as of then; what was exposed before and comes late is no news.
+        if state.believed is not None and frame.time <= state.believed.time:
+            return state
+        return self.observer.seen(replace(state, expected=None), frame)
+
+    def act(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
+        told = state.seen.told
+        if told and time - told[-1][0] > 1.5 / self.rate:
+            state = replace(state, expected=None)
         act = {
             "look": self._look,
             "transit": self._go,
@@ -175,25 +171,12 @@ class HorizonController(AbstractController[HorizonState]):
             "resume": self._resume,
             "retreat": self._go,
         }[state.phase]
-        state, velocity = act(state, time)
-        if not np.all(np.isfinite(velocity)):
-            return replace(state, mode="done", outcome="the law gave no finite command"), STOP
-        seen = with_command(state.seen, time, velocity)
-        return replace(state, seen=seen), Command(velocity, state.height)
+        return act(state, time)
 
-    def _stopped(
-        self, state: HorizonState, time: float, mode: str, note: str
-    ) -> tuple[HorizonState, Command]:
-        seen = with_command(state.seen, time, np.zeros(3))
-        return (
-            replace(state, mode=mode, note=note, seen=seen, expected=None),
-            Command(np.zeros(3), state.height),
-        )
-
-    def _look(self, state: HorizonState, time: float) -> tuple[HorizonState, Array]:
+    def _look(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
         state = replace(state, mode="look", note="")
         if len(state.frames) < FRAMES:
-            return state, np.zeros(3)
+            return state, self._standing(state)
         pose = mean_pose(state.frames)
         pose[2] = wrapped(float(pose[2]))
         if state.window is not None and state.window.hand is not None:
@@ -209,10 +192,10 @@ class HorizonController(AbstractController[HorizonState]):
         inside = max(off[0] / self.tolerance[0], off[1] / self.tolerance[1])
         text = f"{1000 * off[0]:.2f} mm and {np.rad2deg(off[1]):.2f}° off the goal"
         if inside <= INSIDE:
-            return replace(state, mode="done", note=text, outcome=ARRIVED), np.zeros(3)
+            return replace(state, mode="done", note=text, outcome=ARRIVED), self._standing(state)
         if state.landings >= self.landings:
             why = ARRIVED if inside <= 1 else f"still {text} after {state.landings} landings"
-            return replace(state, mode="done", note=text, outcome=why), np.zeros(3)
+            return replace(state, mode="done", note=text, outcome=why), self._standing(state)
         cars = self._usable(state)
         if not any(cars):
             # Better what failed than nothing: it may go well from here, and what was learned may be wrong.
@@ -221,7 +204,7 @@ class HorizonController(AbstractController[HorizonState]):
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
             why = "no push can be steered"
-            return replace(state, mode="done", outcome=why), np.zeros(3)
+            return replace(state, mode="done", outcome=why), self._standing(state)
         k, target, length = found
         place, car, hand = self.planner.usable[k].placement, cars[k], self.hand(state, time)
         assert place is not None
@@ -230,13 +213,15 @@ class HorizonController(AbstractController[HorizonState]):
             here = relative(pose, hand)
             way = self.planner.transits.between(replace(place, pose=here, tips=here[None, :2]), place)
         except FlatpushError as error_found:
-            return replace(state, mode="done", outcome=f"no way on from here: {error_found}"), np.zeros(3)
+            return replace(state, mode="done", outcome=f"no way on from here: {error_found}"), self._standing(
+                state
+            )
         stops = np.column_stack([compose(pose, way.poses), way.heights])[1:]
         stops[:, 2] = hand[2] + pose_error(stops[:, :3], hand)[:, 2]
         state = replace(
             state,
             phase="transit",
-            way=tuple(stops),
+            stops=tuple(stops),
             push=k,
             target=target,
             frames=(pose,),
@@ -266,36 +251,31 @@ class HorizonController(AbstractController[HorizonState]):
             cars.append(car if car is not None and car.leeway >= LEEWAY else None)
         return cars
 
-    def _go(self, state: HorizonState, time: float) -> tuple[HorizonState, Array]:
-        """Along the way to its next stop; then to what comes after it."""
-        dt, pusher = 1 / self.rate, self.scene.pusher
-        hand, way, height = self.hand(state, time), state.way, state.height
-        while way:
-            target = way[0]
-            delta = target[:3] - hand
-            rise = float(target[3]) - height
-            distance = math.sqrt(float(delta[0]) ** 2 + float(delta[1]) ** 2 + rise * rise)
-            if distance < 1e-7 and abs(float(delta[2])) < 1e-6:
-                way = way[1:]
-                continue
-            gently = len(way) == 1 and target[3] == 0 and height == 0
-            share = min(1.0, (pusher.speed if gently else 5 * pusher.speed) * dt / max(distance, 1e-12))
-            moved = replace(state, mode=state.phase, way=way, height=height + share * rise)
-            return moved, share * delta / dt
+    def _go(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
+        """To the next stop; then to what comes after it."""
+        hand, stops, seen = self.hand(state, time), state.stops, state.seen
+        still = not np.any(seen.last.velocity) and seen.climb == 0
+        while stops and still and np.max(np.abs(stops[0] - [*hand, seen.height])) < 1e-6:
+            stops = stops[1:]
+        if stops:
+            table = bool(stops[0][3] == 0 and seen.height == 0)
+            moved = replace(state, mode=state.phase, stops=stops)
+            return moved, self.limits.towards(
+                stops[0], hand, seen.height, seen.last, seen.climb, 1 / self.rate, table
+            )
         if state.phase == "retreat":
-            return replace(state, phase="look", mode="look", way=(), since=time, frames=()), np.zeros(3)
+            looking = replace(state, phase="look", mode="look", stops=(), since=time, frames=())
+            return looking, self._standing(state)
         # The object rests where it was seen; the push begins from there.
-        seen = Seen(Measurement(time, state.frames[0], hand))
         assert state.tip is not None
         if self.learn:
-            state = replace(
-                state,
-                window=LearningWindow(float(state.frames[0][2]), self.sd / math.sqrt(FRAMES), state.tip),
-            )
-        pushing = replace(state, expected=None, phase="push", way=(), height=0.0, seen=seen, frames=())
+            window = LearningWindow(float(state.frames[0][2]), self.sd / math.sqrt(FRAMES), state.tip)
+            state = replace(state, window=window)
+        landed = Measurement(time, state.frames[0], hand)
+        pushing = replace(state, expected=None, phase="push", stops=(), believed=landed, frames=())
         return self._push(pushing, time)
 
-    def _push(self, state: HorizonState, time: float) -> tuple[HorizonState, Array]:
+    def _push(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
         assert state.tip is not None
         target = state.target
         assert target is not None
@@ -316,44 +296,62 @@ class HorizonController(AbstractController[HorizonState]):
         m, dt = car.model, 1 / self.rate
         pose = self._expected(state, time)
         flat, goal = m.flat_of(pose), m.flat_of(target)
+        driven = self._driven(state, float(pose[2]), time)
+        allowed = state.allowed - driven
         rest = rest_of_path(
             flat,
             goal,
             car.radius,
             m.left,
             m.right,
-            state.rest,
+            state.rest - driven,
             self.scene.pusher.speed * dt,
             float(m.flat_point @ m.direction),
             self.tolerance,
         )
-        if rest.how == "past" or state.allowed < 0:
+        if rest.how == "past" or allowed < 0:
             return self._retreat(state, time, "the end of this push")
-        speed = min(self.scene.pusher.speed, rest.length / dt + 1e-9)
-        omega = rest.curvature * speed
         arm = m.arm
+        # The finger runs as fast as it may; it comes to rest at the end.
+        ratio = math.hypot(
+            *point_velocity(0.0, 1.0, rest.curvature, float(arm[0]), float(arm[1]), -m.heading, dt, RAMP)
+        )
+        end = braking(rest.length, BRAKE * self.scene.pusher.acceleration / ratio, dt)
+        speed = min(self.scene.pusher.speed / max(1.0, ratio), end + 1e-9)
+        omega = rest.curvature * speed
         u = point_velocity(flat[2], speed, omega, float(arm[0]), float(arm[1]), float(pose[2]), dt, RAMP)
-        slow = min(1.0, self.scene.pusher.speed / max(math.hypot(*u), 1e-300))
-        velocity = slow * np.array([u[0], u[1], omega if m.turns else 0.0])
+        velocity = np.array([u[0], u[1], omega if m.turns else 0.0])
         window = state.window
         if window is not None:
             window = replace(window, ratios=(*window.ratios, car.ratio(rest.curvature)))
-        step = slow * speed * dt
         return replace(
             state,
             mode="push",
             note=rest.how,
-            rest=rest.length - step,
-            allowed=state.allowed - step,
+            rest=rest.length,
+            allowed=allowed,
             window=window,
             expected=pose,
-        ), velocity
+        ), Command(velocity)
+
+    def _driven(self, state: HorizonState, turn: float, time: float) -> float:
+        """How far the flat point has come in the last tick [m]."""
+        assert state.car is not None
+        if state.mode != "push" or not state.seen.told:
+            return 0.0
+        begun, u = state.seen.told[-1]
+        c, s = math.cos(turn), math.sin(turn)
+        speed, _ = state.car.model.motion(
+            c * float(u[0]) + s * float(u[1]), c * float(u[1]) - s * float(u[0])
+        )
+        return max(0.0, speed) * (time - begun)
 
     def _expected(self, state: HorizonState, time: float) -> Array:
         """X_WO now, as the finger sticks: from the newest frame, or one command on from the last tick."""
         assert state.car is not None
         if state.expected is None:
-            return predicted(state.seen, time, state.car.model)
+            assert state.believed is not None
+            return predicted(state.believed, state.seen.told, time, state.car.model)
         begun, u = state.seen.told[-1]
         x, y, turn = (float(v) for v in state.expected)
         return np.array(state.car.model.moved(x, y, turn, float(u[0]), float(u[1]), time - begun))
@@ -363,28 +361,30 @@ class HorizonController(AbstractController[HorizonState]):
         counts[state.push] += 1
         return replace(state, failures=tuple(counts))
 
-    def _resume(self, state: HorizonState, time: float) -> tuple[HorizonState, Array]:
+    def _resume(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
         """Along the normal, back to the edge where the finger is; the object rests."""
         if not state.frames:
-            return replace(state, mode="resume"), np.zeros(3)
+            return replace(state, mode="resume"), self._standing(state)
         pose = mean_pose(state.frames)
         hand = self.hand(state, time)
         tip = relative(pose, hand)[:2]
         _, normal, distance = nearest_contact(self.scene.object.outline, tip)
         gap = distance - self.scene.pusher.tip_radius
         if gap <= NEAR:
-            seen = Seen(Measurement(time, pose, hand))
-            state = replace(state, phase="push", tip=tip, gap=0.0, seen=seen, frames=(), expected=None)
+            back = Measurement(time, pose, hand)
+            state = replace(state, phase="push", tip=tip, gap=0.0, believed=back, frames=(), expected=None)
             return self._push(replace(state, car=self.observer.car(state, state.push, tip)), time)
-        speed = min(self.scene.pusher.speed, gap * self.rate)
+        speed = min(
+            self.scene.pusher.speed, braking(gap, BRAKE * self.scene.pusher.acceleration, 1 / self.rate)
+        )
         c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
         along = np.array([c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], 0.0])
-        return replace(state, mode="resume"), speed * along
+        return replace(state, mode="resume"), Command(speed * along)
 
-    def _retreat(self, state: HorizonState, time: float, why: str) -> tuple[HorizonState, Array]:
+    def _retreat(self, state: HorizonState, time: float, why: str) -> tuple[HorizonState, Command]:
         """Back from the object along the normal, on the table; then look."""
         assert state.tip is not None
-        frame = state.seen.frame
+        frame = state.believed
         assert frame is not None
         _, normal, _ = nearest_contact(self.scene.object.outline, state.tip)
         angle = math.atan2(normal[1], normal[0]) + float(frame.object[2])
@@ -392,19 +392,11 @@ class HorizonController(AbstractController[HorizonState]):
         stop = np.array([hand[0] - back * math.cos(angle), hand[1] - back * math.sin(angle), hand[2], 0.0])
         window = state.window
         if window is not None and state.car is not None:
-            turned = float(predicted(state.seen, time, state.car.model)[2])
+            turned = float(predicted(frame, state.seen.told, time, state.car.model)[2])
             window = replace(self.observer.along(state, window, frame, hand, turned), hand=hand)
-        return self._go(replace(state, phase="retreat", way=(stop,), note=why, window=window), time)
+        return self._go(replace(state, phase="retreat", stops=(stop,), note=why, window=window), time)
 
     def hand(self, state: HorizonState, time: float) -> Array:
         """X_WE now: where the newest frame's log has it, and the commands since."""
-        frame = state.seen.frame
-        assert frame is not None
-        hand = np.array(frame.pusher, dtype=float)
-        told = state.seen.told
-        for k, (begun, velocity) in enumerate(told):
-            ended = told[k + 1][0] if k + 1 < len(told) else time
-            dt = min(ended, time) - max(begun, frame.time)
-            if dt > 0:
-                hand += dt * velocity
-        return hand
+        assert state.seen.frame is not None
+        return hand(state.seen.frame, state.seen.told, time)

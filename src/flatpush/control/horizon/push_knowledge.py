@@ -9,12 +9,9 @@ from numpy.typing import ArrayLike
 from ...geometry.pose import Array
 from ...planning.options import PushOption, push_option
 from ...problem import Scene
-from ..learning.belief import SteeringBelief, SteeringEstimate
+from ..learning.belief import SD_COF, SD_RHO, SteeringBelief, SteeringEstimate
 from .contact_car import contact_car, drift_of, sides_of
 
-# The prior: standard deviations of each coordinate of the centre of friction, by the object's size, and of ρ, by
-# itself.
-SD_COF, SD_RHO = 0.015, 0.15
 # What was learned is used once it knows the heading of the axle so much better than the prior.
 BETTER = 0.9
 

@@ -8,7 +8,6 @@ import numpy as np
 from ...geometry.pose import Array
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ControllerState
-from ..loop.frames import Seen
 from ..loop.measurement import Measurement
 from .contact_car import ContactCar
 from .push_knowledge import Steering
@@ -43,9 +42,9 @@ class HorizonState(ControllerState):
         phase: "look" at the object at rest, "transit" to a contact, "push", "resume" (the finger has lost the edge and
             comes back to it), "retreat".
         since: frames exposed before this do not count while looking [s]; frames: poses seen since.
-        newest: the newest frame as it came. seen: what it means, with the pose as it is believed, or what was known at
-            the last landing, and the commands since. expected: X_WO at the last tick, if no frame came since.
-        way: poses and heights still to go to (x, y, θ, height), the next first. height: of the pusher now [m].
+        believed: the newest frame with the pose as it is believed, or what was known at the last landing.
+        expected: X_WO at the last tick, if no frame came since.
+        stops: still to go to (x, y, θ, height), the next first.
         push: which option; target: X_WO where it shall end. tip: centre of the finger in O, smoothed,
             and its gap to the edge [m].
         car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
@@ -58,11 +57,9 @@ class HorizonState(ControllerState):
     phase: Phase = "look"
     since: float = -np.inf
     frames: tuple[Array, ...] = ()
-    newest: Measurement | None = None
+    believed: Measurement | None = None
     expected: Array | None = None
-    seen: Seen = field(default_factory=Seen)
-    way: tuple[Array, ...] = ()
-    height: float = 0.0
+    stops: tuple[Array, ...] = ()
     push: int = -1
     target: Array | None = None
     tip: Array | None = None

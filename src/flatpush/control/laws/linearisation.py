@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ...geometry import pose_error, wrap_angle
 from ...geometry.pose import Array
-from ..loop.controller import ARRIVED
+from ..loop.controller import ARRIVED, ControllerState
+from ..loop.limits import Limits
 from ..loop.measurement import STOP, Command
 from .formulas import linearised
 from .gains import HOLDS, Gains, Hold
 from .path_following import path_command
-from .push_controller import AbstractPushController, PushState, pusher_velocity
+from .push_controller import AbstractPushController, pusher_velocity
 from .reference import AbstractReference, PathReference, check_reference
 from .steering_model import SteeringModel
 
@@ -26,7 +27,7 @@ FLOOR, CAP = 0.1, 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class TrackingState(PushState):
+class TrackingState(ControllerState):
     """Of TrackingController and PostureController.
 
     Attributes:
@@ -48,8 +49,11 @@ class _Linearised(AbstractPushController[TrackingState]):
     gains: Gains
     rate: float = 60.0
     hold: Hold = "ramp"
+    deceleration: float = float("inf")
+    limits: Limits | None = None
     body: str = ""
     stale: float = 0.5
+    noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
 
     def start(self, time: float = 0.0) -> TrackingState:
         if not np.isfinite(time):
@@ -91,7 +95,7 @@ class _Linearised(AbstractPushController[TrackingState]):
         self, state: TrackingState, pose: Array, time: float, speed: float, omega: float
     ) -> tuple[TrackingState, Command]:
         velocity = pusher_velocity(self.model, pose, speed, omega, 1 / self.rate, HOLDS.index(self.hold))
-        return self.moved(state, time, velocity)
+        return state, Command(velocity)
 
     def _stop(self, state: TrackingState, time: float, outcome: str) -> tuple[TrackingState, Command]:
         return replace(state, mode="done", outcome=outcome), STOP
@@ -104,7 +108,8 @@ class TrackingController(_Linearised):
     Args:
         model: of the push. gains: along x and y of W. rate: of the ticks [Hz], 10 to 1000 and beyond.
         hold: how the pusher moves in a tick, see gains.Hold.
-        body: name of the object; frames of others are refused. stale: age at which a frame is too old [s].
+        deceleration: of the flat point at the end [m/s²].
+        limits, body, stale, noise: see AbstractController.
         reference: of the flat point.
         finish: after the reference has ended, follow its path on until its end is abeam.
 
@@ -123,21 +128,31 @@ class TrackingController(_Linearised):
         # Dubins references turn as tightly as their margin allows, the model a little more.
         check_reference(self.reference, max(self.model.left, self.model.right))
 
-    def act(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
+    def follow(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         t, T = time - state.begun, self.reference.duration
-        if t >= T - 1e-9:
+        if t >= T - self._braking_time - 1e-9:
             return self._ending(state, pose, time)
         target = self.reference.at(t)
         nominal = float(np.hypot(*self.reference.at(0.5 * T).velocity))
         return self._tick(state, pose, time, target, nominal)
+
+    @property
+    def _braking_time(self) -> float:
+        """Before its end the reference is left for its path, so that there is room to come to rest [s]."""
+        if not (self.finish and isinstance(self.reference, PathReference)):
+            return 0.0
+        return 0.5 * self.reference.speed / self.deceleration + (
+            2 / self.rate if np.isfinite(self.deceleration) else 0
+        )
 
     def _ending(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         """At rest the arc-length law takes over, until the end of the path is abeam."""
         path = self.reference
         if not (self.finish and isinstance(path, PathReference)):
             return self._stop(state, time, ARRIVED)
-        length = state.length if state.mode == "path" else path.length
-        found = path_command(self.model, path, pose, length, path.speed, 1 / self.rate)
+        dt, t = 1 / self.rate, time - state.begun
+        length = state.length if state.length > 0 else min(path.length, path.run(t)[0])
+        found = path_command(self.model, path, pose, length, dt, deceleration=self.deceleration)
         if found is None:
             return self._stop(state, time, ARRIVED)
         speed, omega, length, _ = found
@@ -168,7 +183,7 @@ class PostureController(_Linearised):
         if not (np.isfinite(self.speed) and self.speed > 0):
             raise InputError("a flat speed is positive", key="speed", value=self.speed)
 
-    def act(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
+    def follow(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
         goal = np.asarray(self.goal, dtype=float)
         gx, gy, angle = self.model.flat_of(goal)
         x, y, heading = self.model.flat_of(pose)

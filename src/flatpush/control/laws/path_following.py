@@ -1,16 +1,18 @@
 """Following the path of a push in arc length, without a singularity at rest: the default for Dubins references."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ..loop.controller import ARRIVED
+from ..loop.controller import ARRIVED, ControllerState
+from ..loop.limits import Limits, braking
 from ..loop.measurement import STOP, Command
-from .formulas import along_path, nearest, wrapped
+from .formulas import along_path, nearest, place, wrapped
 from .gains import limits
-from .push_controller import AbstractPushController, PushState, pusher_velocity
+from .push_controller import AbstractPushController, pusher_velocity
 from .reference import PathReference
 from .steering_model import SteeringModel
 
@@ -19,7 +21,7 @@ POLE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class PathState(PushState):
+class PathState(ControllerState):
     """Of PathController: with the arc length reached [m]."""
 
     length: float = 0.0
@@ -36,22 +38,37 @@ def path_command(
     path: PathReference,
     pose: Array,
     length: float,
-    speed: float,
     dt: float,
     gains: tuple[float, float] | None = None,
+    deceleration: float = float("inf"),
 ) -> tuple[float, float, float, bool] | None:
-    """Flat speed, ω, arc length abeam and whether the turn is at its limit; None where the end is abeam or behind."""
+    """Flat speed, ω, arc length abeam and whether the turn is at its limit; None where the end is abeam or behind.
+
+    Args:
+        length: arc length at the last tick [m]. dt: of the tick [s].
+        gains: k₁ [1/m²] and k₂ [1/m]; default: see path_gains.
+        deceleration: of the flat point at the end [m/s²].
+    """
     x, y, heading = model.flat_of(pose)
     reach = 0.25 / max(model.left, model.right)
-    length, left, angle, bend = nearest(path.table, x, y, length, max(reach, 2 * speed * dt))
-    psi = wrapped(heading - angle)
+    length, left, angle, bend = nearest(path.table, x, y, length, max(reach, 2 * path.speed * dt))
+    # Off an ellipsoid the flat point drifts aside as it runs: its way is at an angle to the heading.
+    drift = model.across(1.0, bend)
+    psi = wrapped(heading + math.atan(drift) - angle)
     remaining = path.length - length
     if remaining <= 1e-9:
         return None
-    k1, k2 = gains if gains is not None else path_gains(model)
-    kappa, bounded = along_path(float(left), psi, bend, k1, k2, model.left, model.right)
+    remaining /= max(0.2, math.cos(psi))
     # The last tick is a short one: a pusher cannot come back.
-    speed = min(speed, remaining / (dt * max(0.2, float(np.cos(psi)))))
+    speed = path.speed_from(length, dt)
+    speed = min(speed, remaining / dt if math.isinf(deceleration) else braking(remaining, deceleration, dt))
+    if length + speed * dt < path.length:
+        # The mean turn of what is driven in this tick: it may lead over a junction.
+        bend = wrapped(place(path.table, length + speed * dt)[2] - angle) / (speed * dt)
+    k1, k2 = gains if gains is not None else path_gains(model)
+    kappa, bounded = along_path(
+        float(left), psi, bend * math.hypot(1.0, drift), k1, k2, model.left, model.right
+    )
     return speed, kappa * speed, length, bounded
 
 
@@ -62,8 +79,8 @@ class PathController(AbstractPushController[PathState]):
     Args:
         model: of the push. path: of its flat point, and the flat speed. rate: of the ticks [Hz].
         stiffness, damping: gains k₁ [1/m²] and k₂ [1/m]; default: see path_gains.
-        fastest: the pusher's speed limit [m/s]; turning, the pusher is faster than the flat point.
-        body, stale: as for TrackingController.
+        deceleration: of the flat point at the end [m/s²].
+        limits, body, stale, noise: see AbstractController.
 
     Raises:
         InputError: for gains that are unstable at this rate and speed.
@@ -74,16 +91,18 @@ class PathController(AbstractPushController[PathState]):
     rate: float = 60.0
     stiffness: float | None = None
     damping: float | None = None
-    fastest: float = float("inf")
+    deceleration: float = float("inf")
+    limits: Limits | None = None
     body: str = ""
     stale: float = 0.5
+    noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise InputError("a rate is positive", key="rate", value=self.rate)
         self.check_stale()
-        if not self.fastest > 0:
-            raise InputError("a speed limit is positive", key="fastest", value=self.fastest)
+        if not self.deceleration > 0:
+            raise InputError("a deceleration is positive", key="deceleration", value=self.deceleration)
         k1, k2 = self.gains
         if not (np.isfinite(k1) and np.isfinite(k2) and k1 > 0 and k2 > 0):
             raise InputError("stiffness and damping are positive and finite", value=(k1, k2))
@@ -108,14 +127,12 @@ class PathController(AbstractPushController[PathState]):
             raise InputError("a time is finite", value=time)
         return PathState()
 
-    def act(self, state: PathState, pose: Array, time: float) -> tuple[PathState, Command]:
+    def follow(self, state: PathState, pose: Array, time: float) -> tuple[PathState, Command]:
         dt = 1 / self.rate
-        wanted = self.path.speed_from(state.length, dt)
-        found = path_command(self.model, self.path, pose, state.length, wanted, dt, self.gains)
+        found = path_command(self.model, self.path, pose, state.length, dt, self.gains, self.deceleration)
         if found is None:
             return replace(state, mode="done", outcome=ARRIVED, length=self.path.length), STOP
         speed, omega, length, bounded = found
         velocity = pusher_velocity(self.model, pose, speed, omega, dt)
-        velocity *= min(1.0, self.fastest / max(float(np.hypot(velocity[0], velocity[1])), 1e-300))
         mode, note = ("saturated", "at the edge of the friction cone") if bounded else ("path", "")
-        return self.moved(replace(state, mode=mode, note=note, length=length), time, velocity)
+        return replace(state, mode=mode, note=note, length=length), Command(velocity)

@@ -1,8 +1,9 @@
 """Where the flat point of a push should be: the path of a plan, exactly, with its derivatives."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,55 @@ class FlatState(NamedTuple):
     acceleration: Array
 
 
+@dataclass(frozen=True)
+class Ramps:
+    """Speeding up from a slow speed, cruising and slowing down to it again, along a length [m], [m/s], [m/s²].
+
+    From rest to rest where it is 0. From piece to piece of a path the turn changes at once, and with it the velocity of
+    the fingertips; the slower that is, the less there is to be made up for.
+    """
+
+    length: float
+    slow: float
+    speed: float
+    acceleration: float
+
+    @property
+    def top(self) -> float:
+        """The highest speed that is reached."""
+        return min(self.speed, math.sqrt(self.slow**2 + self.acceleration * self.length))
+
+    @property
+    def ramp(self) -> float:
+        """Time of speeding up [s]."""
+        return (self.top - self.slow) / self.acceleration
+
+    @property
+    def duration(self) -> float:
+        rest = self.length - (self.top + self.slow) * self.ramp
+        return 2 * self.ramp + max(0.0, rest) / self.top
+
+    def run(self, time: float) -> tuple[float, float, float]:
+        """Length, speed and its rate at a time."""
+        T, r, a = self.duration, self.ramp, self.acceleration
+        t = min(max(time, 0.0), T)
+        left = T - t
+        if t < r:
+            return self.slow * t + 0.5 * a * t * t, self.slow + a * t, a
+        if left < r:
+            return self.length - self.slow * left - 0.5 * a * left * left, self.slow + a * left, -a
+        return (self.slow + 0.5 * a * r) * r + self.top * (t - r), self.top, 0.0
+
+    def speed_from(self, gone: float, dt: float) -> float:
+        """Mean speed over a tick that begins after a length; never 0 before the end."""
+        step = 0.5 * self.acceleration * dt
+        left = max(0.0, self.length - gone)
+        rising, falling = (
+            math.sqrt(self.slow**2 + 2 * self.acceleration * s) for s in (max(0.0, gone), left)
+        )
+        return min(self.speed, rising + step, max(falling - step, step, self.slow))
+
+
 class AbstractReference(ABC):
     """A motion of the flat point for 0 ≤ t ≤ duration, twice differentiable but at junctions."""
 
@@ -46,12 +96,12 @@ class PathReference(AbstractReference):
     Attributes:
         table: the path, shape (n, 6), see control.laws.formulas.
         speed: of the flat point [m/s]; with a time law, its largest.
-        laws: of the flat point in each piece, from rest to rest; none: the speed is constant.
+        laws: of the flat point in each piece; none: the speed is constant.
     """
 
     table: Array
     speed: float
-    laws: tuple[Trapezoid, ...] = ()
+    laws: tuple[Ramps, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.speed) and self.speed > 0):
@@ -85,21 +135,15 @@ class PathReference(AbstractReference):
         while k + 1 < len(self.laws) and time > self.laws[k].duration:
             time -= self.laws[k].duration
             k += 1
-        row, law = self.table[k], self.laws[k]
-        t, a, r = min(max(time, 0.0), law.duration), law.acceleration, law.ramp
-        left = law.duration - t
-        rate = a if t < r else -a if left < r else 0.0
-        return float(row[0] + law.travelled(np.array(t))), a * min(t, left, r), rate
+        length, speed, rate = self.laws[k].run(time)
+        return float(self.table[k, 0]) + length, speed, rate
 
     def speed_from(self, length: float, dt: float) -> float:
         """Mean flat speed that the time law asks for in a tick that begins at an arc length; never 0 before the end."""
         if not self.laws:
             return self.speed
         k = int(np.clip(np.searchsorted(self.table[:, 0], length, side="right") - 1, 0, len(self.laws) - 1))
-        law, gone = self.laws[k], max(0.0, length - float(self.table[k, 0]))
-        step = 0.5 * law.acceleration * dt
-        braking = np.sqrt(2 * law.acceleration * max(0.0, law.length - gone)) - step
-        return float(min(law.speed, np.sqrt(2 * law.acceleration * gone) + step, max(braking, step)))
+        return self.laws[k].speed_from(length - float(self.table[k, 0]), dt)
 
     @classmethod
     def straight(cls, start: ArrayLike, angle: float, length: float, speed: float) -> "PathReference":
@@ -114,19 +158,21 @@ class PathReference(AbstractReference):
         model: SteeringModel,
         speed: float | None = None,
         pusher: Pusher | None = None,
+        slow: float = 0.0,
     ) -> "PathReference":
         """The path of a planned push, from its arcs.
 
         Args:
             speed: of the flat point [m/s]; default: the mean of the plan.
             pusher: given, each arc has the plan's time law within this pusher's speed and acceleration.
+            slow: the share of its speed at which the slowest arc begins and ends, as do all others; 0: at rest.
 
         Raises:
             InputError: where the flat point rests or reverses in an arc.
         """
         X = np.asarray(segment.object[0], dtype=float)
         rows: list[list[float]] = []
-        laws: list[Trapezoid] = []
+        laws: list[Ramps] = []
         done = 0.0
         tips = transform(relative(segment.object[0], segment.pusher[0]), segment.fingers)
         for arc in segment.arcs:
@@ -149,13 +195,15 @@ class PathReference(AbstractReference):
         if not rows:
             raise InputError("a push without arcs has no reference")
         if laws:
-            speed = max(law.ramp * law.acceleration for law in laws)
+            begin = slow * min(law.speed for law in laws)
+            laws = [replace(law, slow=begin) for law in laws]
+            speed = max(law.top for law in laws)
         if speed is None:
             speed = done / float(segment.times[-1])
         return cls(np.array(rows), speed, tuple(laws))
 
 
-def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Trapezoid:
+def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Ramps:
     """The planner's time law of an arc, for the fastest of the fingertips (k, 2) in O, in the flat point's lengths."""
     fastest = float(np.max(np.hypot(*velocity_at(arc.twist, tips).T)))
     turn = abs(float(arc.twist[2]))
@@ -163,7 +211,7 @@ def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Trapezoid:
         fastest * arc.duration, fastest / turn if turn > 0 else np.inf, pusher.speed, pusher.acceleration
     )
     share = length / law.length
-    return Trapezoid(length, share * law.speed, share * law.acceleration)
+    return Ramps(length, 0.0, share * law.speed, share * law.acceleration)
 
 
 def check_reference(reference: AbstractReference, most: float = np.inf) -> None:

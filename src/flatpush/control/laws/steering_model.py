@@ -16,6 +16,10 @@ from ..learning.belief import SteeringEstimate
 
 # Turns per length at which the drift is computed, and halvings of the force's angle for each.
 _SAMPLES, _HALVINGS = 21, 40
+# The same for two fingers, where they cost nothing.
+_FINE = 801
+# The edges of a friction cone themselves belong to sliding.
+EDGE = 1 - 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +81,38 @@ class SteeringModel:
             float((full.left_centre - car.flat_point) @ n),
             float((car.flat_point - full.right_centre) @ n),
         )
-        edge = 1 - 1e-6  # the edges themselves belong to sliding
-        kappas = np.linspace(-edge / right, edge / left, _SAMPLES)
+        kappas = np.linspace(-EDGE / right, EDGE / left, _SAMPLES)
         drift = np.zeros(_SAMPLES)
         for k, kappa in enumerate(kappas):
             # Twists of the whole car, per length of its own flat point; of ours, along our heading.
             v = velocity_at(_twist(full, car.flat_point, h, float(kappa)), car.flat_point)
             drift[k] = float(v @ n) / float(v @ h)
         contact = car.contact.point + car.cof
-        return cls(car.flat_point, angle, edge / left, edge / right, contact, car.pusher, turns, drift)
+        return cls(car.flat_point, angle, EDGE / left, EDGE / right, contact, car.pusher, turns, drift)
+
+    @classmethod
+    def of_two(cls, car: Car, wide: Car) -> "SteeringModel":
+        """Of two fingers that carry the object: every twist of it is a mixture of twists of the two cars.
+
+        Args:
+            car: as planned. wide: of the same push with a smaller margin, whose turns are the limits.
+        """
+        span = car.left_centre - car.right_centre
+        across = -perpendicular(span)
+        angle = float(np.arctan2(across[1], across[0]))
+        h, z = np.array([np.cos(angle), np.sin(angle)]), car.flat_point
+        n = perpendicular(h)
+        turns, drifts = [], []
+        for V in (wide.right, car.right, car.straight, car.left, wide.left):
+            # Per length along the heading turn and drift of a mixture are the same mixture of turns and drifts.
+            v = velocity_at(V, z)
+            turns.append(float(V[2]) / float(v @ h))
+            drifts.append(float(v @ n) / float(v @ h))
+        left, right = EDGE * max(turns), -EDGE * min(turns)
+        order = np.argsort(turns)
+        asked = np.linspace(-right, left, _FINE)
+        drift = np.interp(asked, np.array(turns)[order], np.array(drifts)[order])
+        return cls(z, angle, left, right, car.contact.point + car.cof, car.pusher, True, drift)
 
     @classmethod
     def of_flat(

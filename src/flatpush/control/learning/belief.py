@@ -26,6 +26,9 @@ from ...errors import InputError
 from ...geometry import perpendicular
 from ...geometry.pose import Array
 
+# The prior of every controller: standard deviations of each coordinate of the centre of friction, by the object's size,
+# and of ρ, by itself.
+SD_COF, SD_RHO = 0.015, 0.15
 # Weights depend on the estimate, which depends on the weights: so many rounds.
 ROUNDS = 4
 # Contacts this near to each other share their weight [m].

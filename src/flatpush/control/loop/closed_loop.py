@@ -2,16 +2,55 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ...simulation.plant import Plant
-from .controller import AbstractController
+from .controller import AbstractController, ControllerState
 from .sensor import AbstractSensor
+
+
+class World(Protocol):
+    """Where a simulated object and the hand are."""
+
+    @property
+    def object(self) -> Array:
+        """X_WO, shape (3,)."""
+        ...
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """Contact mode of each finger, in words of your own."""
+        ...
+
+    @property
+    def hand(self) -> Array:
+        """X_WE, shape (3,)."""
+        ...
+
+    @property
+    def outcome(self) -> str:
+        """ "" while all is well; anything else ends the run."""
+        ...
+
+
+WorldT = TypeVar("WorldT", bound=World)
+StateT = TypeVar("StateT", bound=ControllerState)
+
+
+class Table(Protocol[WorldT]):
+    """What a controller is tried on: a simulation.plant.Plant, or one of your own."""
+
+    def start(self, object_: ArrayLike, hand: ArrayLike) -> WorldT:
+        """The world with the object at X_WO and the hand at X_WE, on the table."""
+        ...
+
+    def step(self, state: WorldT, velocity: ArrayLike, dt: float) -> WorldT:
+        """The world after a time [s] in which the hand moves with a velocity in W (vx, vy, yaw rate)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,15 +58,17 @@ class ClosedLoopRun:
     """What happened, tick by tick.
 
     Attributes:
-        times: shape (n,) [s]. object, pusher: X_WO and X_WE, shape (n, 3).
+        times: shape (n,) [s]. object, pusher: X_WO and X_WE, shape (n, 3). heights: of the pusher at the end
+            of each tick, shape (n,) [m].
         modes: of the controller in each tick. contacts: of the first finger in the plant.
-        outcome: the controller's, or "out of time", or why the plant stopped.
+        outcome: the controller's, or "out of time …" with what it was doing, or why the plant stopped.
         notes: what the controller said, each once, with the time when it first did.
     """
 
     times: Array
     object: Array
     pusher: Array
+    heights: Array
     modes: tuple[str, ...]
     contacts: tuple[str, ...]
     outcome: str
@@ -35,15 +76,15 @@ class ClosedLoopRun:
 
 
 def drive(
-    controller: AbstractController[Any],
-    plant: Plant,
+    controller: AbstractController[StateT],
+    plant: Table[WorldT],
     start: ArrayLike,
     hand: ArrayLike,
     sensor: AbstractSensor,
     duration: float,
     *,
     begin: float = 0.0,
-    told: Callable[[float, Any], None] | None = None,
+    told: Callable[[float, StateT], None] | None = None,
 ) -> ClosedLoopRun:
     """Runs the loop from an object at X_WO and a hand at X_WE until the controller has an outcome or time is out.
 
@@ -57,21 +98,23 @@ def drive(
     dt = 1 / controller.rate
     world, state, eyes = plant.start(start, hand), controller.start(begin), sensor.start()
     expose = getattr(sensor, "expose", None)
-    times, objects, hands, modes, contacts = [], [], [], [], []
+    times, objects, hands, heights, modes, contacts = [], [], [], [], [], []
     notes: dict[str, float] = {}
-    outcome = "out of time"
-    up = False
+    outcome = ""
+    lifted: Array | None = None  # X_WE while the hand is in the air
     for k in range(int(np.ceil(duration * controller.rate)) + 1):
         time = begin + k * dt
+        at = world.hand if lifted is None else lifted
         if expose is not None:
-            eyes = expose(eyes, time, world.object, world.hand)
+            eyes = expose(eyes, time, world.object, at)
         eyes, frames = sensor.arrived(eyes, time)
         state, command = controller.step(state, frames[-1] if frames else None, time)
         times.append(time)
         objects.append(world.object)
-        hands.append(world.hand)
+        hands.append(at)
+        heights.append(command.height)
         modes.append(state.mode)
-        contacts.append("separation" if up else world.modes[0])
+        contacts.append(world.modes[0] if lifted is None else "separation")
         if state.note:
             notes.setdefault(state.note, time)
         if told is not None:
@@ -80,15 +123,22 @@ def drive(
             outcome = state.outcome or world.outcome
             break
         if command.height > 0:
-            turned = np.asarray(world.hand, dtype=float) + dt * command.velocity
-            world = type(world)(world.object, turned, world.modes, world.points, world.gaps, "")
-            up = True
+            lifted = np.asarray(at, dtype=float) + dt * command.velocity
         else:
-            if up:
-                world = plant.start(world.object, world.hand)
-                up = False
+            if lifted is not None:
+                world, lifted = plant.start(world.object, lifted), None
             world = plant.step(world, command.velocity, dt)
+    if not outcome:
+        why = f": {state.note}" if state.note else ""
+        outcome = f"out of time after {duration:.1f} s, {state.mode}{why}"
     said = tuple((t, text) for text, t in notes.items())
     return ClosedLoopRun(
-        np.array(times), np.array(objects), np.array(hands), tuple(modes), tuple(contacts), outcome, said
+        np.array(times),
+        np.array(objects),
+        np.array(hands),
+        np.array(heights),
+        tuple(modes),
+        tuple(contacts),
+        outcome,
+        said,
     )

@@ -1,61 +1,100 @@
 """Following a whole plan: each push under feedback, and between pushes the pusher goes to where the object now is."""
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from ...errors import InputError
-from ...geometry import compose, pose_error, relative
+from ...geometry import compose, pose_error, relative, transform
 from ...geometry.pose import Array
-from ...planning.options import push_option
-from ...problem import Plan
+from ...planning.options import PushOption, push_option
+from ...problem import Plan, PushSegment, Scene
 from ...problem.mechanics import local_rho, named
 from ..laws.gains import Gains
 from ..laws.linearisation import TrackingController
 from ..laws.path_following import PathController
 from ..laws.reference import PathReference
 from ..laws.steering_model import SteeringModel
-from ..learning.belief import SteeringBelief
+from ..learning.belief import SD_COF, SD_RHO, SteeringBelief
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
-from ..loop.frames import Seen, refusal
-from ..loop.measurement import STOP, Command, Measurement
+from ..loop.frames import hand, mean_pose
+from ..loop.limits import Limits
+from ..loop.measurement import Command, Measurement
+from .carried import CarriedController
 from .learning_controller import LearningController
 
-# The prior of the centre of friction, by the object's size, and of ρ, by itself.
-SD_COF, SD_RHO = 0.03, 0.3
 # A hand so far before or behind its place at the contact has lost the object, by the object's size; beside it, so far.
 LOST_AHEAD, LOST_ASIDE = 0.25, 1.0
+# Looking at an object at rest: at least so many frames, and for so long [s].
+FRAMES, LOOK = 10, 0.3
+# The share of a friction margin that feedback leaves to two fingers, and the share of the acceleration that is planned
+# with for coming to rest: turning takes its part.
+RESERVE, BRAKE = 0.5, 0.6
+# The shares of the speed and the acceleration that are planned with; the rest is for corrections.
+CRUISE, RAMP = 0.98, 0.9
+# The share of the speed at which the junctions of arcs are passed.
+SLOW = {"path": 0.03, "dfl": 0.2}
+
+#: How the outcome of a run begins that ended off its goal.
+BESIDE = "ended beside the goal"
+
+OnePush = TrackingController | PathController | LearningController | CarriedController
+
+
+@dataclass(frozen=True, eq=False)
+class Looking:
+    """At the object at rest: poses X_WO of the frames exposed since a time [s], and the exposure of the first."""
+
+    since: float
+    poses: tuple[Array, ...] = ()
+    first: float = np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Travelling:
+    """To the stops (x, y, θ, height) that are left, the next first; then what comes after."""
+
+    stops: tuple[Array, ...]
+    pushes: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Pushing:
+    """With the state of the push's controller."""
+
+    inner: ControllerState
 
 
 @dataclass(frozen=True, eq=False)
 class PlanState(ControllerState):
-    """Of PlanController: which push, its controller's state, whether it is on its way, and on the table."""
+    """Of PlanController: which push is next or under way (their number: all are done), and what it does for it."""
 
     push: int = 0
-    inner: Any = None
-    landing: bool = True
-    down: bool = False
-    hand: Array | None = None
-    newest: float = -np.inf
+    phase: Looking | Travelling | Pushing = Looking(-np.inf)
 
 
 @dataclass(frozen=True, eq=False)
 class PlanController(AbstractController[PlanState]):
     """Runs the pushes of a plan one after the other. Build with PlanController.of.
 
+    Before every push and after the last it looks at the object at rest; it arrives if that is within the tolerance.
+
     Attributes:
-        plan: what is followed. inner: a controller for each push. speed: of the lifted pusher [m/s].
+        plan: what is followed. inner: a controller for each push. tolerance: distance [m] and angle [rad].
+        limits, stale, noise: see AbstractController.
     """
 
     plan: Plan
-    inner: tuple[Any, ...]
-    speed: float
+    inner: tuple[OnePush, ...]
+    tolerance: tuple[float, float]
+    limits: Limits
     stale: float = 0.5
-    rate: float = field(init=False)
+    noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rate", self.inner[0].rate)
+    @property
+    def rate(self) -> float:  # type: ignore[override]
+        return self.inner[0].rate
 
     @classmethod
     def of(
@@ -69,17 +108,19 @@ class PlanController(AbstractController[PlanState]):
         learn: bool = False,
         sd: tuple[float, float] = (0.0003, float(np.deg2rad(0.3))),
         stale: float = 0.5,
+        tolerance: tuple[float, float] | None = None,
     ) -> "PlanController":
         """The controllers of a plan's pushes.
 
         Args:
             gains: of the law dfl; default: natural frequency 2 rad/s, critically damped.
-            timing: "even": a constant flat speed, the mean of the plan, through all junctions; "plan": the plan's time
-                law, from rest to rest in each arc, for the law path.
-            learn: adapts the model of each push. sd: of a frame's position and angle [m, rad], for learning.
+            timing: "even": the plan's time law without its rests: slow at the junctions of its arcs;
+                "plan": from rest to rest in each arc, for the law path.
+            learn: adapts the model of each push of one finger. sd: of a frame's position and angle [m, rad].
+            tolerance: default: the scene's, of the goal.
 
         Raises:
-            InputError: for a plan without pushes, and as the laws do.
+            InputError: for a plan without pushes, a push without motion, and as the laws do.
         """
         if timing == "plan" and law != "path":
             raise InputError(
@@ -88,95 +129,181 @@ class PlanController(AbstractController[PlanState]):
             )  # fmt: skip
         if plan.status != "solved" or not plan.pushes:
             raise InputError("there is no push to follow in this plan", hint="It has none, or is not solved.")
-        scene = plan.scene
-        found: list[Any] = []
+        scene, first = plan.scene, plan.pushes[0]
+        limits = Limits.of(scene.pusher, first.fingers, scene.object.outline.size)
+        goal = scene.planning.goal_tolerance
+        within = (float(min(goal[:2])), float(goal[2])) if tolerance is None else tolerance
+        if not min(within) > 0:
+            raise InputError("a tolerance is positive", key="tolerance", value=within)
+        gentle = replace(
+            scene.pusher, speed=CRUISE * scene.pusher.speed, acceleration=RAMP * scene.pusher.acceleration
+        )
+        found: list[OnePush] = []
         for segment in plan.pushes:
-            push = named(scene, segment.push)
-            option, whole = push_option(scene, push), push_option(scene, push, margin=0.0)
+            if len(segment.times) < 2 or not segment.arcs:
+                raise InputError(
+                    f"the push {segment.push!r} has no motion", hint="The plan is damaged; plan anew."
+                )
+            option = push_option(scene, named(scene, segment.push))
             if option.car is None:
                 raise InputError(f"the push {segment.push!r} cannot be steered: {option.refusal}")
-            model = SteeringModel.of_car(option.car, scene.pusher.turns, whole.car)
-            path = PathReference.of_push(segment, model, pusher=scene.pusher if timing == "plan" else None)
-            one: Any
+            model = _model(scene, option)
+            path = PathReference.of_push(
+                segment, model, pusher=gentle, slow=0.0 if timing == "plan" else SLOW[law]
+            )
+            braking = BRAKE * scene.pusher.acceleration / _fastest(model, segment)
+            one: OnePush
             if law == "dfl":
-                one = TrackingController(model, gains or Gains.of(2.0), rate, reference=path, stale=stale)
+                one = TrackingController(
+                    model, gains or Gains.of(2.0), rate, deceleration=braking, stale=stale, reference=path
+                )
             else:
-                one = PathController(model, path, rate, fastest=scene.pusher.speed, stale=stale)
-            if learn:
-                d = -option.car.contact.point
-                rho = local_rho(scene.object, d / float(np.hypot(*d)))
-                size = scene.object.outline.size
-                prior = SteeringBelief.prior(scene.object.cof, rho, SD_COF * size, SD_RHO * rho)
-                one = LearningController(one, prior, sd, max(0.002, 5 * sd[0]))
+                one = PathController(model, path, rate, deceleration=braking, stale=stale)
+            if len(segment.fingers) == 2:
+                one = CarriedController(one, scene.object.outline, segment.fingers, scene.pusher.tip_radius)
+            elif learn:
+                one = _learning(scene, option, one, sd)
             found.append(one)
-        return cls(plan, tuple(found), 5 * scene.pusher.speed, stale)
+        return cls(plan, tuple(found), within, limits, stale, sd)
 
     def landing(self, push: int, pose: Array, before: float) -> Array:
         """Where the pusher is a distance before the contact of a push, with the object at X_WO: X_WE."""
-        back = np.array([-before, 0.0, 0.0])
-        return compose(pose, compose(self.inner[push].model.pusher, back))
+        return compose(pose, compose(self._model(push).pusher, [-before, 0.0, 0.0]))
 
     def start(self, time: float = 0.0) -> PlanState:
         if not np.isfinite(time):
             raise InputError("a time is finite", value=time)
-        return PlanState()
+        return PlanState(phase=Looking(time))
 
-    def step(
-        self, state: PlanState, measurement: Measurement | None, time: float
-    ) -> tuple[PlanState, Command]:
-        if state.outcome:
-            return state, STOP
-        if not np.isfinite(time):
-            return replace(state, mode="held", note="the time is not finite"), STOP
-        if state.landing:
-            return self._land(state, measurement, time)
-        inner = self.inner[state.push]
-        below, command = inner.step(state.inner, measurement, time)
-        state = replace(state, inner=below, mode=below.mode, note=below.note)
+    def noticed(self, state: PlanState, frame: Measurement) -> PlanState:
+        phase = state.phase
+        if isinstance(phase, Looking) and frame.time >= phase.since - 1e-9:
+            pose = np.asarray(frame.object, dtype=float)
+            first = frame.time if not phase.poses else phase.first
+            return replace(state, phase=replace(phase, poses=(*phase.poses, pose), first=first))
+        if isinstance(phase, Pushing):
+            below = replace(phase.inner, seen=state.seen)
+            inner = self.inner[state.push].noticed(below, frame)  # type: ignore[arg-type]
+            return replace(state, phase=Pushing(inner))
+        return state
+
+    def act(self, state: PlanState, time: float) -> tuple[PlanState, Command]:
+        phase, seen = state.phase, state.seen
+        assert seen.frame is not None
+        if isinstance(phase, Looking):
+            enough = len(phase.poses) >= FRAMES and seen.frame.time - phase.first >= LOOK
+            if not enough:
+                note = f"looking at the object: {len(phase.poses)} frames"
+                return replace(state, mode="looking", note=note), self._standing(state)
+            pose = mean_pose(phase.poses)
+            if state.push == len(self.inner):
+                return self._ended(state, pose), self._standing(state)
+            state = self._to_land(state, pose, hand(seen.frame, seen.told, time))
+            return self._travel(state, time)
+        if isinstance(phase, Travelling):
+            return self._travel(state, time)
+        return self._push(state, phase, time)
+
+    def _ended(self, state: PlanState, pose: Array) -> PlanState:
+        distance, turn = goal_error(self.plan, pose)
+        inside = distance <= self.tolerance[0] and turn <= self.tolerance[1]
+        return replace(state, mode="done", note="", outcome=ARRIVED if inside else beside(distance, turn))
+
+    def _to_land(self, state: PlanState, pose: Array, here: Array) -> PlanState:
+        """Up, over to before the contact, down, and to the contact."""
+        pusher = self.plan.scene.pusher
+        before, contact = (self.landing(state.push, pose, d) for d in (pusher.approach, 0.0))
+        # The hand turns the short way.
+        before[2] = here[2] + pose_error(before, here)[2]
+        contact[2] = before[2]
+        stops = ([*here, pusher.lift], [*before, pusher.lift], [*before, 0.0], [*contact, 0.0])
+        return replace(state, phase=Travelling(tuple(np.array(stop) for stop in stops), True), note="")
+
+    def _travel(self, state: PlanState, time: float) -> tuple[PlanState, Command]:
+        phase, seen = state.phase, state.seen
+        assert isinstance(phase, Travelling)
+        assert seen.frame is not None
+        here, stops = hand(seen.frame, seen.told, time), phase.stops
+        still = not np.any(seen.last.velocity) and seen.climb == 0
+        while stops and still and np.max(np.abs(stops[0] - [*here, seen.height])) < 1e-6:
+            stops = stops[1:]
+        state = replace(state, mode="transit", note="", phase=replace(phase, stops=stops))
+        if stops:
+            table = bool(stops[0][3] == 0 and seen.height == 0)
+            return state, self.limits.towards(
+                stops[0], here, seen.height, seen.last, seen.climb, 1 / self.rate, table
+            )
+        if phase.pushes:
+            begun = Pushing(self.inner[state.push].start(time))
+            return self._push(replace(state, phase=begun), begun, time)
+        return replace(state, phase=Looking(time)), self._standing(state)
+
+    def _push(self, state: PlanState, phase: Pushing, time: float) -> tuple[PlanState, Command]:
+        frame = state.seen.frame
+        assert frame is not None
+        below = replace(phase.inner, seen=state.seen)
+        below, command = self.inner[state.push].act(below, time)  # type: ignore[arg-type]
+        state = replace(state, phase=Pushing(below), mode=below.mode, note=below.note)
+        if below.outcome and below.outcome != ARRIVED:
+            return replace(state, mode="done", outcome=below.outcome), command
+        if self._lost(state.push, frame):
+            return replace(state, mode="done", outcome="the finger lost the object"), self._standing(state)
         if not below.outcome:
-            if measurement is not None and below.mode != "held" and self._lost(state.push, measurement):
-                return replace(state, mode="done", outcome="the finger lost the object"), STOP
             return state, command
-        if below.outcome != ARRIVED or state.push + 1 == len(self.inner):
-            return replace(state, mode="done", outcome=below.outcome), STOP
-        return replace(
-            state, push=state.push + 1, inner=None, landing=True, down=False, hand=None, newest=time
-        ), STOP
+        if np.any(state.seen.last.velocity):
+            return state, self._standing(state)
+        # Back from the object; then it is looked at.
+        here = hand(frame, state.seen.told, time)
+        back = compose(here, [-self.plan.scene.pusher.approach, 0.0, 0.0])
+        away = Travelling((np.array([*back, 0.0]),), False)
+        return self._travel(replace(state, push=state.push + 1, phase=away), time)
 
     def _lost(self, push: int, frame: Measurement) -> bool:
         """Whether the hand is nowhere near its place at the contact of a push; going on would push the air."""
         size = self.plan.scene.object.outline.size
-        ahead, aside, _ = relative(self.inner[push].model.pusher, relative(frame.object, frame.pusher))
+        ahead, aside, _ = relative(self._model(push).pusher, relative(frame.object, frame.pusher))
         return abs(float(ahead)) > LOST_AHEAD * size or abs(float(aside)) > LOST_ASIDE * size
 
-    def _land(self, state: PlanState, frame: Measurement | None, time: float) -> tuple[PlanState, Command]:
-        """Lifted, to the approach distance from where the object was seen; then on the table, straight to the contact.
+    def _model(self, push: int) -> SteeringModel:
+        one = self.inner[push]
+        return one.inner.model if isinstance(one, CarriedController) else one.model
 
-        Frames from before the last push ended do not count.
-        """
-        dt, pusher = 1 / self.rate, self.plan.scene.pusher
-        if frame is not None:
-            wrong = refusal(frame, Seen(), time, "", self.stale)
-            if wrong:
-                return replace(state, mode="held", note=wrong), STOP
-            if frame.time > state.newest:
-                hand = frame.pusher if state.hand is None else state.hand
-                state = replace(
-                    state, hand=np.asarray(hand, dtype=float), newest=frame.time, inner=frame.object
-                )
-        if state.hand is None or state.inner is None:
-            return replace(state, mode="waiting", note="no measurement yet"), STOP
-        before = 0.0 if state.down else pusher.approach
-        target = self.landing(state.push, np.asarray(state.inner, dtype=float), before)
-        way = pose_error(target, state.hand)
-        distance = float(np.hypot(way[0], way[1]))
-        share = min(1.0, (pusher.speed if state.down else self.speed) * dt / max(distance, 1e-12))
-        if distance < 1e-9 and abs(way[2]) < 1e-9 and not state.down:
-            return replace(state, down=True, mode="transit"), STOP
-        ahead = float(way[:2] @ [np.cos(target[2]), np.sin(target[2])])
-        if state.down and ahead < 1e-9:
-            begun = replace(state, landing=False, inner=self.inner[state.push].start(time), mode="transit")
-            return begun, STOP
-        velocity = share * way / dt
-        moved = replace(state, hand=state.hand + share * way, mode="transit", note="")
-        return moved, Command(velocity, 0.0 if state.down else pusher.lift)
+
+def _model(scene: Scene, option: PushOption) -> SteeringModel:
+    """Of a push as it is planned, with what feedback may use beyond that."""
+    assert option.car is not None
+    assert option.placement is not None
+    if len(option.placement.tips) == 2:
+        margin = RESERVE * scene.planning.friction_margin
+        wide = push_option(scene, option.push, margin=margin).car or option.car
+        return SteeringModel.of_two(option.car, wide)
+    whole = push_option(scene, option.push, margin=0.0).car
+    return SteeringModel.of_car(option.car, scene.pusher.turns, whole)
+
+
+def _fastest(model: SteeringModel, segment: PushSegment) -> float:
+    """Speed of the fastest fingertip in the tightest turn, per flat speed."""
+    away = transform(model.pusher, segment.fingers) - model.flat_point
+    turn, h = max(model.left, model.right), model.direction
+    return max(1.0, *(float(np.hypot(h[0] - k * y, h[1] + k * x)) for k in (turn, -turn) for x, y in away))
+
+
+def _learning(
+    scene: Scene, option: PushOption, one: TrackingController | PathController, sd: tuple[float, float]
+) -> LearningController:
+    assert option.car is not None
+    d = -option.car.contact.point
+    rho = local_rho(scene.object, d / float(np.hypot(*d)))
+    prior = SteeringBelief.prior(scene.object.cof, rho, SD_COF * scene.object.outline.size, SD_RHO * rho)
+    return LearningController(one, prior, sd, max(0.002, 5 * sd[0]))
+
+
+def goal_error(plan: Plan, pose: Array) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of a pose from the goal."""
+    error = pose_error(pose, plan.scene.goal)
+    return float(np.hypot(error[0], error[1])), abs(float(error[2]))
+
+
+def beside(distance: float, turn: float) -> str:
+    """The outcome of a run that ended off its goal, by a distance [m] and an angle [rad]."""
+    return f"{BESIDE}: {1000 * distance:.2f} mm and {np.rad2deg(turn):.2f}° off"

@@ -1,22 +1,22 @@
 """A plan under feedback in the contact simulator, with a simulated camera: what `flatpush track` runs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from shapely import MultiPoint, Point
 
 from ...errors import InputError
-from ...geometry import compose, pose_error
+from ...geometry import compose
 from ...problem import Plan
 from ...simulation.plant import Plant
 from ..horizon.controller import HorizonController
 from ..laws.gains import Gains
 from ..loop.closed_loop import ClosedLoopRun, drive
-from ..loop.controller import AbstractController, ControllerState
+from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.sensor import Camera, SimulatedSensor
-from .plan_controller import PlanController
+from .plan_controller import BESIDE, PlanController, beside, goal_error
 
 Law = Literal["path", "dfl", "horizon"]
 Timing = Literal["even", "plan"]
@@ -34,6 +34,7 @@ class TrackedRun:
         centre: the centre of friction is off by this in O, (x, y) [m].
         start: X_WO is off by this at the start [m, m, rad].
         seed: of the camera's noise.
+        tolerance: it arrives within this distance [m] and angle [rad]; None: the scene's, of the goal.
     """
 
     controller: Law = "path"
@@ -47,6 +48,7 @@ class TrackedRun:
     centre: tuple[float, float] = (0.0, 0.0)
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seed: int = 0
+    tolerance: tuple[float, float] | None = None
 
     def of(self, plan: Plan, told: Callable[[float, ControllerState], None] | None = None) -> ClosedLoopRun:
         """Runs it; told is called at every tick with the time and the controller's state.
@@ -68,11 +70,27 @@ class TrackedRun:
         hand = compose(first.pusher[0], [-2 * scene.pusher.approach, 0.0, 0.0])
         sensor = SimulatedSensor(self.camera, np.random.default_rng(self.seed))
         begin = scene.start_pose + np.array(self.start)
-        return drive(law, plant, begin, hand, sensor, patience, told=told)
+        run = drive(law, plant, begin, hand, sensor, patience, told=told)
+        # What the controller saw is one thing; here is known where the object is.
+        if run.outcome != ARRIVED and not run.outcome.startswith(BESIDE):
+            return run
+        (distance, turn), within = goal_error(plan, run.object[-1]), self._within(plan)
+        inside = distance <= within[0] and turn <= within[1]
+        return replace(run, outcome=ARRIVED if inside else beside(distance, turn))
+
+    def _within(self, plan: Plan) -> tuple[float, float]:
+        goal = plan.scene.planning.goal_tolerance
+        return self.tolerance or (float(min(goal[:2])), float(goal[2]))
 
     def _law(self, plan: Plan) -> AbstractController:
         if self.controller == "horizon":
-            return HorizonController.of(plan, rate=self.rate, latency=self.camera.latency, learn=self.learn)
+            return HorizonController.of(
+                plan,
+                self.rate,
+                self.camera.latency,
+                self.learn,
+                tolerance=self._within(plan),
+            )
         return PlanController.of(
             plan,
             self.controller,
@@ -82,10 +100,5 @@ class TrackedRun:
             learn=self.learn,
             sd=(max(self.camera.position, 1e-5), max(self.camera.angle, 1e-4)),
             stale=0.5 + self.camera.latency,
+            tolerance=self._within(plan),
         )
-
-
-def goal_error(plan: Plan, pose: np.ndarray) -> tuple[float, float]:
-    """Distance [m] and angle [rad] of a pose from the goal."""
-    error = pose_error(pose, plan.scene.goal)
-    return float(np.hypot(error[0], error[1])), abs(float(error[2]))
