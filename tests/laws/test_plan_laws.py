@@ -5,12 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from shapely import Polygon
 from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.errors import InputError
 from flatpush.geometry import pose_error, transform
 from flatpush.planning import Planner
+from flatpush.simulation.pieces import pieces
 from flatpush.steering import words
 
 
@@ -36,9 +38,7 @@ def test_an_exact_plan_verifies_and_ends_at_its_goal_in_the_simulator(seed):
     """Default margin, one finger, from the arcs, on the same exact surface: within 0.05 mm and 0.05°."""
     scene = random_scene(seed)
     plan = fp.plan(scene)
-    if plan.status == "no_plan":
-        assert plan.reason
-        return
+    assert plan.status == "solved", plan.reason
     assert fp.verify(plan).ok, fp.verify(plan).failed
     rollout = fp.simulate(plan)
     assert rollout.outcome == "completed"
@@ -51,12 +51,15 @@ def test_an_exact_plan_verifies_and_ends_at_its_goal_in_the_simulator(seed):
 @pytest.mark.parametrize("seed", SEEDS[:3])
 def test_plans_of_every_model_verify_under_their_model(seed, model):
     plan = fp.plan(random_scene(seed, model=model))
-    if plan.status == "solved":
-        assert fp.verify(plan).ok, fp.verify(plan).failed
-        assert fp.simulate(plan, model=model).outcome == "completed"
-        distance, turn = final_error(fp.simulate(plan, model=model), plan.scene.goal)
-        assert distance < 5e-5
-        assert turn < np.deg2rad(0.05)
+    if plan.status == "no_plan":
+        assert plan.reason
+        return
+    assert fp.verify(plan).ok, fp.verify(plan).failed
+    rollout = fp.simulate(plan, model=model)
+    assert rollout.outcome == "completed"
+    distance, turn = final_error(rollout, plan.scene.goal)
+    assert distance < 5e-5
+    assert turn < np.deg2rad(0.05)
 
 
 @pytest.mark.parametrize("cost", ["flat", "pusher", "time"])
@@ -199,15 +202,12 @@ def test_clearance_sees_a_needle_between_samples(triangle):
             planning=fp.Planning(iterations=300, time_limit=60),
         )
         plan = fp.plan(scene)
-        if plan.status == "solved":
-            from shapely import Polygon
-
-            from flatpush.simulation.pieces import pieces
-
-            for piece in pieces(plan.segments, scene.start_pose):
-                for f in np.linspace(0, 1, 10):
-                    shape = Polygon(transform(piece.object_at(f), triangle.outline.vertices))
-                    assert shape.distance(Polygon(needle)) >= plan.certificate.clearance
+        if plan.status == "no_plan":
+            continue
+        for piece in pieces(plan.segments, scene.start_pose):
+            for f in np.linspace(0, 1, 10):
+                shape = Polygon(transform(piece.object_at(f), triangle.outline.vertices))
+                assert shape.distance(Polygon(needle)) >= plan.certificate.clearance
 
 
 def test_a_rolling_finger_reaches_the_goal_by_the_samples(rectangle):
