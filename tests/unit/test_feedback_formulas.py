@@ -1,0 +1,48 @@
+"""The signs, limits and thresholds of the feedback laws, each where a mistake would not show in a closed loop."""
+
+import numpy as np
+import pytest
+
+from flatpush.control.laws.formulas import along_path, linearised
+from flatpush.control.loop.limits import Limits, braking
+from flatpush.control.loop.measurement import STOP, Command
+
+
+@pytest.mark.parametrize("bend", [10.0, -10.0])
+def test_beside_a_bent_path_the_turn_is_that_of_a_parallel_curve(bend):
+    """A curve a distance e to the left of one with radius 1/κ has the radius 1/κ - e."""
+    e = 0.02
+    kappa, bounded = along_path(e, 0.0, bend, 1e-12, 1e-12, 100.0, 100.0)
+    assert not bounded
+    assert kappa == pytest.approx(1 / (1 / bend - e))
+
+
+def test_the_linearisation_turns_left_as_far_as_left_allows_and_right_as_far_as_right():
+    turns = [
+        linearised(0, 0, 0, 0.02, 0, aside, 0.02, 0, 0, 0, 400, 400, 40, 40, 30.0, 10.0, 0.002, 0.06, 1e-9, 0)
+        for aside in (1.0, -1.0)
+    ]
+    assert [omega / 0.02 for _, _, omega, _, _ in turns] == pytest.approx([30.0, -10.0])
+    assert all(0 < scale < 1 for _, _, _, scale, _ in turns)
+
+
+def test_braking_ends_at_the_end_with_no_more_than_the_deceleration():
+    length, a, dt, speeds = 0.01, 0.1, 1 / 60, []
+    while length > 0 and len(speeds) < 200:
+        speeds.append(braking(length, a, dt))
+        length -= speeds[-1] * dt
+    assert length == pytest.approx(0.0, abs=1e-12)
+    assert np.max(-np.diff([*speeds, 0.0])) <= a * dt * (1 + 1e-9)
+
+
+def test_whatever_is_wanted_the_limits_hold():
+    limits = Limits(np.array([[0.0, 0.009], [0.0, -0.009]]), 0.02, 0.1, np.pi / 2, 0.1, 0.5)
+    rng, dt, yaw, last, before = np.random.default_rng(0), 1 / 60, 0.0, STOP, np.zeros((2, 2))
+    for _ in range(300):
+        wanted = Command(rng.normal(size=3) * [0.05, 0.05, 3.0])
+        last = limits.kept(last, 0.0, wanted, yaw, dt)
+        tips = limits.tip_velocities(last.velocity, yaw)
+        assert np.max(np.hypot(*tips.T)) <= 0.02
+        assert np.max(np.hypot(*(tips - before).T)) <= 0.1 * dt
+        assert abs(last.velocity[2]) <= np.pi / 2
+        yaw, before = yaw + last.velocity[2] * dt, tips
