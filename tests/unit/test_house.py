@@ -19,8 +19,6 @@ CIRCLES = {
 }
 BARE_COLUMNS = {
     "control.laws.rollout_kernel.many",
-    "planning.graph.kernels._steer",
-    "planning.graph.kernels._within",
     "steering.kernels._time",
     "steering.kernels.three_twist_between",
     "steering.kernels.timed_between",
@@ -29,8 +27,6 @@ LONG = {
     "control.laws.formulas.linearised",
     "control.laws.rollout.rollout",
     "control.laws.rollout_kernel.many",
-    "planning.graph.kernels._bound",
-    "planning.graph.kernels.delayed_bound",
     "steering.kernels.three_twist_between",
     "steering.kernels.timed_between",
 }
