@@ -47,6 +47,7 @@ _NAMES = {
     "Runs": "simulation",
     "Scene": "problem",
     "Support": "friction",
+    "Uncertainty": "problem",
     "Workspace": "problem",
     "describe": "planning",
     "fit_ellipsoid": "friction",
@@ -93,6 +94,7 @@ __all__ = [
     "Runs",
     "Scene",
     "Support",
+    "Uncertainty",
     "Workspace",
     "__version__",
     "describe",
@@ -136,6 +138,7 @@ if TYPE_CHECKING:
         Pusher,
         Rollout,
         Scene,
+        Uncertainty,
         Workspace,
     )
     from .simulation import Claim, Noise, Perturbation, Proof, Report, Runs, prove, simulate

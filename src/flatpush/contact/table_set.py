@@ -25,6 +25,7 @@ from ..friction.patches import patches as divided
 from ..friction.support import Support
 from ..geometry import perpendicular, rotate
 from ..geometry.pose import Array
+from .point_contact import PointContact
 from .wrench_cone import WrenchCone
 
 # A rotation centre within this part of the support's radius from a foot is under it.
@@ -37,6 +38,10 @@ AHEAD = np.array([0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5])
 WIDE, TIGHT, STEPS = 100.0, 0.1, 40
 # Points of the pressure on which families are compared, and how many of the best are then proved.
 SKETCH, TRIED = 64, 6
+# Patches that a spread pressure is divided into.
+PATCHES = 400
+# Normals of two contacts on one straight side differ by less [rad, and of the side's length].
+PARALLEL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +87,7 @@ class TableSet:
     reach: Array
 
     @classmethod
-    def of(cls, support: Support, share: float, patches: int = 400) -> "TableSet":
+    def of(cls, support: Support, share: float, patches: int = PATCHES) -> "TableSet":
         """The set about a support.
 
         Args:
@@ -200,6 +205,21 @@ def _extreme(g: Array, weights: Array) -> Array:
     found = np.empty(len(g))
     found[order] = change
     return found
+
+
+def shifted(contacts: Sequence[PointContact], offset: float) -> list[list[PointContact]]:
+    """Two contacts in the extreme places that they may have along a straight side, an offset [m] either way.
+
+    Raises:
+        InputError: for an offset on a side that is not straight.
+    """
+    if offset == 0:
+        return [list(contacts)]
+    a, b = contacts
+    if float(a.normal @ b.normal) < 1 - PARALLEL or abs(float((b.point - a.point) @ a.normal)) > PARALLEL:
+        raise InputError("an offset of the grasp needs two fingers on one straight side", value=offset)
+    along = perpendicular(a.normal)
+    return [[replace(c, point=c.point + s * offset * along) for c in (a, b)] for s in (-1.0, 0.0, 1.0)]
 
 
 def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike) -> Array:

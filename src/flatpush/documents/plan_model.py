@@ -81,6 +81,13 @@ class CertificatePart(BaseModel):
     composite_margin: Finite | None = Field(default=None, description="Of both contacts together.")
     uniqueness_margin: Finite | None = Field(default=None, description="Turning centres beyond the object.")
     model_offset: Finite | None = Field(default=None, description="Of the believed line of force.")
+    set_margin: Finite | None = Field(
+        default=None,
+        description="Least depth in the fingers' cone on all tables of the object's uncertainty.",
+    )
+    set_loads: Finite | None = Field(
+        default=None, description="The largest share by which loads may differ so that the plan still holds."
+    )
     growth: Finite | None = Field(default=None, description="The factor by which a small error grows.")
     clearance: Finite | None = Field(default=None, description="To obstacles and bounds.")
     cars: dict[str, CarPart] = Field(default_factory=dict, description="Of each push used, by its name.")

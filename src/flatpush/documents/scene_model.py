@@ -225,6 +225,21 @@ SurfaceForm = Annotated[
 ]
 
 
+class UncertaintyPart(Part):
+    """How well pressure and friction are known."""
+
+    loads: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] = Field(
+        default=0.0,
+        description="The share by which pressure times table friction may differ at every point, 0 to less than 1.",
+    )
+    friction: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="[least, greatest] coefficient between fingertip and object."
+    )
+    offset: NotNegative = unstated(
+        "How far the fingers may stand along a side from their place; 0 if left out."
+    )
+
+
 class ObjectPart(Part):
     """A rigid object on the table, in the frame of its drawing."""
 
@@ -245,6 +260,10 @@ class ObjectPart(Part):
         default=None,
         description="A known limit surface about the centre of friction, in SI: {ellipsoid: 3 × 3 matrix}, "
         "{quartic: 15 coefficients} or {file: surface.json}; it overrides the support's.",
+    )
+    uncertainty: UncertaintyPart | None = Field(
+        default=None,
+        description="{loads: 0.2, friction: [0.24, 0.4], offset: 0.5}: two-finger pushes are proved for all of it.",
     )
 
 
@@ -330,6 +349,10 @@ class PlanningPart(Part):
     two_finger: Literal["cone", "middle"] = Field(
         default="cone",
         description="cone (composite cone of both fingers) or middle (one contact between them).",
+    )
+    proof: Literal["set", "nominal"] = Field(
+        default="set",
+        description="Of an object with an uncertainty: pushes hold on every table of the set, or on the nominal one.",
     )
     cost: Literal["flat", "pusher", "time"] = Field(default="flat", description="flat, pusher or time.")
     switch_cost: NotNegative | None = Field(

@@ -11,6 +11,7 @@ from ..geometry import Outline
 from ..geometry.pose import Array
 from ..problem import Object, Planning, Pusher, Scene, Workspace
 from ..problem.frame import moved_inside
+from ..problem.scene import Uncertainty
 from . import scene_model as m
 from .context import PER_METRE, Context
 from .outline_reader import pixels, read_drawing
@@ -125,7 +126,17 @@ def _object(ctx: Context, part: m.ObjectPart) -> Object:
         with ctx.at("object.surface"):
             surface = read_surface(part.surface, ctx.folder)
     with ctx.at("object"):
-        return Object(outline, support, part.friction, surface, part.name)
+        return Object(
+            outline, support, part.friction, surface, part.name, _uncertainty(ctx, part.uncertainty)
+        )
+
+
+def _uncertainty(ctx: Context, part: m.UncertaintyPart | None) -> Uncertainty | None:
+    if part is None:
+        return None
+    low_high = None if part.friction is None else (part.friction[0], part.friction[1])
+    offset = part.offset / ctx.per_metre if "offset" in part.model_fields_set else 0.0
+    return Uncertainty(part.loads, low_high, offset)
 
 
 def _outline(ctx: Context, form: Any) -> Outline:

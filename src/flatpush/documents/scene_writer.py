@@ -31,6 +31,11 @@ def scene_document(scene: Scene) -> dict[str, Any]:
     }
     if obj.surface is not None:
         target["surface"] = surface_form(obj.surface)
+    if obj.uncertainty is not None:
+        known = obj.uncertainty
+        target["uncertainty"] = {"loads": float(known.loads), "offset": float(known.offset)}
+        if known.friction is not None:
+            target["uncertainty"]["friction"] = [float(x) for x in known.friction]
     pushes: str | list[dict[str, Any]] = "auto"
     if not isinstance(scene.pushes, str):
         pushes = [
@@ -64,6 +69,7 @@ def scene_document(scene: Scene) -> dict[str, Any]:
     document["planning"] = {
         "model": planning.model,
         "two_finger": planning.two_finger,
+        **({"proof": planning.proof} if obj.uncertainty is not None else {}),
         "cost": planning.cost,
         "switch_cost": float(planning.switching),
         "margin": {"friction": float(planning.friction_margin), "clearance": float(planning.clearance)},

@@ -119,7 +119,9 @@ def _simplified(scene: Scene) -> Scene:
     """The scene with an outline of fewer corners, and the support that goes with it."""
     obj = scene.object
     outline = obj.outline.simplified(SIMPLE * obj.outline.size)
-    thing = Object(outline, obj.support_word or obj.support, obj.friction, obj.surface, obj.name)
+    thing = Object(
+        outline, obj.support_word or obj.support, obj.friction, obj.surface, obj.name, obj.uncertainty
+    )
     return replace(scene, object=thing, pushes="auto")
 
 

@@ -12,6 +12,7 @@ from ..problem.mechanics import (
     cone_motions,
     contacts_of,
     placement_of,
+    proved_for_set,
     surface_of,
     takes_cone,
     true_surface,
@@ -48,6 +49,12 @@ def push_option(
         distance = float(np.hypot(*contact.point))
         towards = -contact.point / distance if distance > 0 else contact.normal
         surface = surface_of(scene.object, model or scene.planning.model, towards)
+        if push.fingers == 1 and proved_for_set(scene):
+            raise InputError(
+                "one finger cannot be proved for a set of tables",
+                key="planning.proof",
+                hint="Use two fingers, or proof: nominal and feedback.",
+            )
         if takes_cone(scene, push.fingers):
             contacts = contacts_of(scene, placement)
             motions = cone_motions(scene, placement, surface, margin, quick=quick)

@@ -2,7 +2,7 @@
 
 from .certificate import CarCentres, Certificate
 from .plan import Arc, Plan, PushSegment, Rollout, TransitSegment
-from .scene import Object, Planning, Push, Pusher, Scene, Workspace
+from .scene import Object, Planning, Push, Pusher, Scene, Uncertainty, Workspace
 
 __all__ = [
     "Arc",
@@ -17,5 +17,6 @@ __all__ = [
     "Rollout",
     "Scene",
     "TransitSegment",
+    "Uncertainty",
     "Workspace",
 ]

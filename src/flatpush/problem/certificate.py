@@ -48,6 +48,10 @@ class Certificate:
             motion that can happen, whatever the pressure ([Lynch1996] Theorem 4). None without a turn.
         model_offset: how far the believed surface's line of force passes from the contact, at worst [m]: 0 when the
             planning model is exact; None where two fingers use their cone.
+        set_margin: two fingers, where the object states an uncertainty: the least depth in their composite cone of all
+            wrenches of all tables of that set (a sine; see contact.table_set). Proved where it is not negative.
+        set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
+            offset of that set.
         growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.
         clearance: least distance to obstacles and bounds [m]; None without any.
         cars: of each push used, by its name.
@@ -66,6 +70,8 @@ class Certificate:
     composite_margin: float | None = None
     uniqueness_margin: float | None = None
     model_offset: float | None = None
+    set_margin: float | None = None
+    set_loads: float | None = None
     growth: float | None = None
     clearance: float | None = None
     cars: Mapping[str, CarCentres] = field(default_factory=dict)

@@ -29,7 +29,9 @@ def moved_inside(scene: Scene) -> Scene:
         return scene
     obj = scene.object
     support = obj.support_word or obj.support.translated(-origin)
-    moved = Object(obj.outline.translated(-origin), support, obj.friction, obj.surface, obj.name)
+    moved = Object(
+        obj.outline.translated(-origin), support, obj.friction, obj.surface, obj.name, obj.uncertainty
+    )
 
     def pose(X_WO: Array) -> Array:
         return np.array([*transform(X_WO, origin), X_WO[2]])

@@ -1,15 +1,20 @@
 """From a push of a scene to its mechanics: fingertips, contacts and the limit surface of a model, all about the COF."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from ..contact import Placement, PointContact, cone_twists, place_fingers
+from ..contact import Placement, PointContact, cone_twists, narrowed, place_fingers
+from ..contact.table_set import PATCHES, TableSet, set_twists, shifted
 from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from .scene import Cost, Model, Object, Push, Scene
+
+# Patches of a spread pressure while places are compared.
+QUICK_PATCHES = 100
 
 
 def named(scene: Scene, name: str) -> Push:
@@ -56,7 +61,15 @@ def cone_motions(
     """
     planning = scene.planning
     share = planning.friction_margin if margin is None else margin
-    return _cone_motions(scene.object, placement, surface, share, planning.cost, quick)
+    motions = _cone_motions(scene.object, placement, surface, share, planning.cost, quick)
+    if not proved_for_set(scene):
+        return motions
+    return _set_motions(scene.object, placement, share, motions.tobytes(), quick)
+
+
+def proved_for_set(scene: Scene) -> bool:
+    """Whether pushes must hold for every table of a set."""
+    return scene.object.uncertainty is not None and scene.planning.proof == "set"
 
 
 def slider_of(thing: Object) -> Array:
@@ -130,6 +143,19 @@ def _cone_motions(
     places = placement.tips if cost == "time" else placement.pose[None, :2]
     contacts = _contacts(thing, placement)
     motions = cone_twists(contacts, surface, margin, places - thing.cof, cost, quick=quick)
+    motions.setflags(write=False)
+    return motions
+
+
+@lru_cache(maxsize=256)
+def _set_motions(thing: Object, placement: Placement, margin: float, nominal: bytes, quick: bool) -> Array:
+    assert thing.uncertainty is not None
+    known = thing.uncertainty
+    low = known.friction[0] if known.friction else thing.friction
+    contacts = [replace(c, friction=low) for c in _contacts(thing, placement)]
+    cones = [narrowed(pair, margin) for pair in shifted(contacts, known.offset)]
+    tables = TableSet.of(thing.support, known.loads, QUICK_PATCHES if quick else PATCHES)
+    motions = set_twists(tables, cones, np.frombuffer(nominal).reshape(3, 3))
     motions.setflags(write=False)
     return motions
 

@@ -18,6 +18,34 @@ Cost = Literal["flat", "pusher", "time"]
 MODELS: tuple[Model, ...] = ("exact", "ellipsoid", "local", "quartic")
 
 
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well an object's friction is known: the set of tables and fingers that two-finger pushes are proved for.
+
+    Attributes:
+        loads: pressure times table friction is within this share of its nominal value at every point, in [0, 1).
+        friction: least and greatest Coulomb coefficient between fingertip and object; None: as the object's.
+        offset: the fingers may stand so far along a straight side from where they should, either way [m].
+    """
+
+    loads: float = 0.0
+    friction: tuple[float, float] | None = None
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        def need(good: bool, key: str, rule: str) -> None:
+            if not good:
+                raise InputError(rule, key=f"object.uncertainty.{key}", value=getattr(self, key))
+
+        need(0 <= self.loads < 1, "loads", "loads differ by a share of at least 0 and less than 1 (100 %)")
+        need(
+            bool(np.isfinite(self.offset)) and self.offset >= 0, "offset", "an offset is a length, 0 or more"
+        )
+        if self.friction is not None:
+            low, high = self.friction
+            need(0 < low <= high < np.inf, "friction", "a range of friction is [low, high], 0 < low ≤ high")
+
+
 @dataclass(frozen=True, eq=False)
 class Object:
     """A rigid object on the table, in the frame O of its drawing.
@@ -28,6 +56,7 @@ class Object:
         friction: Coulomb coefficient between fingertip and object.
         surface: a known limit surface about the centre of friction, in SI; it overrides the support's own.
         name: for people.
+        uncertainty: how well pressure and friction are known; None: exactly.
     """
 
     outline: Outline
@@ -35,6 +64,7 @@ class Object:
     friction: float = 0.3
     surface: LimitSurface | None = None
     name: str = "object"
+    uncertainty: Uncertainty | None = None
     support_word: str = field(default="", init=False)  # "uniform" or "outline" where one was given
 
     if TYPE_CHECKING:
@@ -46,6 +76,7 @@ class Object:
             friction: float = 0.3,
             surface: LimitSurface | None = None,
             name: str = "object",
+            uncertainty: Uncertainty | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -57,6 +88,24 @@ class Object:
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise InputError(
                 "friction is a finite number, 0 or more", key="object.friction", value=self.friction
+            )
+        self._check_uncertainty()
+
+    def _check_uncertainty(self) -> None:
+        if self.uncertainty is None:
+            return
+        low, high = self.uncertainty.friction or (self.friction, self.friction)
+        if not low <= self.friction <= high:
+            raise InputError(
+                f"the range of friction contains the object's own, {self.friction:g}",
+                key="object.uncertainty.friction",
+                value=self.uncertainty.friction,
+            )
+        if self.surface is not None:
+            raise InputError(
+                "a known limit surface has no loads that could differ",
+                key="object.uncertainty",
+                hint="Give the support instead of the surface.",
             )
 
     @property
@@ -180,6 +229,7 @@ class Planning:
     model: Model = "exact"
     two_finger: Literal["cone", "middle"] = "cone"
     cost: Cost = "flat"
+    proof: Literal["set", "nominal"] = "set"  # of two fingers, where the object has an uncertainty
     switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
     friction_margin: float = 0.2
     clearance: float = 0.0
@@ -201,6 +251,7 @@ class Planning:
             if not good:
                 raise InputError(rule, key=f"planning.{key}", value=getattr(self, key))
 
+        need(self.proof in ("set", "nominal"), "proof", "a proof is for the set or for the nominal table")
         need(self.model in MODELS, "model", f"the model is one of {', '.join(MODELS)}")
         need(
             0 <= self.friction_margin < 1,

@@ -24,6 +24,7 @@ from .clearance import clearance_of
 from .cone_margins import cone_margins
 from .margins import Margins, contact_margins, two_finger_margins, worse_of
 from .pieces import progress, turns_along
+from .proof import proof_of
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
 TRUSTED_GROWTH = float(np.exp(4.0))
@@ -80,6 +81,7 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
         cost += sum(float(s.times[-1]) for s in transits)
     elif scene.planning.cost == "pusher":
         cost += sum(_transit_length(s) for s in transits)
+    proof = proof_of(scene, pushes)
     x, y, angle = (float(value) for value in pose_error(pose, scene.goal))
     return Certificate(
         goal_error=(x, y, angle),
@@ -93,6 +95,8 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
         composite_margin=worst.composite,
         uniqueness_margin=worst.unique,
         model_offset=worst.offset,
+        set_margin=None if proof is None else proof.margin,
+        set_loads=None if proof is None else proof.loads,
         growth=growth,
         clearance=clearance_of(scene, segments),
         cars=cars,

@@ -1,19 +1,19 @@
 """Whether a plan holds for every table of a set, and for how large a set it does."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..contact import PointContact, WrenchCone
-from ..contact.table_set import TableSet
+from ..contact import WrenchCone
+from ..contact.table_set import TableSet, shifted
 from ..errors import InputError
-from ..geometry import perpendicular, shift_twist
+from ..geometry import shift_twist
 from ..geometry.pose import Array
-from ..problem import Plan
+from ..problem import Plan, PushSegment, Scene
 from ..problem.mechanics import contacts_of, named, placement_of
+from ..problem.scene import Uncertainty
 
-# Normals of two contacts that differ by less stand on one straight side [rad].
-PARALLEL = 1e-9
 # The largest share of loads is found to this [parts of the nominal loads].
 RESOLVED = 1e-4
 
@@ -67,35 +67,40 @@ def prove(plan: Plan, loads: float = 0.2, *, friction: float | None = None, offs
     scene = plan.scene
     if not plan.pushes:
         raise InputError("there is no push to prove in this plan", value=plan.status)
-    if scene.object.surface is not None:
-        raise InputError(
-            "a known limit surface has no loads that could differ",
-            key="object.surface",
-            hint="Give the support instead.",
-        )
-    mu = scene.object.friction if friction is None else friction
-    if isinstance(mu, bool) or not 0 < mu <= scene.object.friction:
-        raise InputError(
-            f"the least friction is above 0 and at most the object's ({scene.object.friction:g})",
-            key="friction", value=mu,
-        )  # fmt: skip
-    if not (np.isfinite(offset) and offset >= 0):
-        raise InputError("an offset is a finite length, 0 or more", key="offset", value=offset)
-    tables = TableSet.of(scene.object.support, loads)
-    found: list[tuple[WrenchCone, Array, str, int]] = []
     for segment in plan.pushes:
         if len(segment.fingers) != 2:
             raise InputError(
                 "only pushes of two fingers hold for a set of tables", key=f"push {segment.push!r}",
                 value=len(segment.fingers), hint="One finger needs feedback: flatpush track.",
             )  # fmt: skip
+    most = scene.object.friction
+    if friction is not None and not 0 < friction <= most:
+        raise InputError(f"the least friction is above 0 and at most the object's, {most:g}", value=friction)
+    known = Uncertainty(loads, None if friction is None else (friction, most), offset)
+    found = proof_of(replace(scene, object=replace(scene.object, uncertainty=known)), plan.pushes)
+    assert found is not None
+    return found
+
+
+def proof_of(scene: Scene, pushes: Sequence[PushSegment]) -> Proof | None:
+    """The proof for the uncertainty of the scene's object; None without one, without a motion or with one finger."""
+    known = scene.object.uncertainty
+    if known is None or any(len(segment.fingers) != 2 for segment in pushes):
+        return None
+    mu = scene.object.friction if known.friction is None else known.friction[0]
+    tables = TableSet.of(scene.object.support, known.loads)
+    found: list[tuple[WrenchCone, Array, str, int]] = []
+    for segment in pushes:
         contacts = contacts_of(scene, placement_of(scene, named(scene, segment.push)))
-        for cone in _cones(contacts, float(mu), offset, segment.push):
+        for pair in shifted([replace(c, friction=mu) for c in contacts], known.offset):
+            cone = WrenchCone.of(pair)
             found += [
                 (cone, shift_twist(arc.twist, scene.object.cof), segment.push, i)
                 for i, arc in enumerate(segment.arcs)
                 if arc.duration > 0
             ]
+    if not found:
+        return None
     margins = [float(tables.margin(cone, twist)) for cone, twist, _, _ in found]
     worst = int(np.argmin(margins))
     cone, twist, push, number = found[worst]
@@ -108,22 +113,6 @@ def prove(plan: Plan, loads: float = 0.2, *, friction: float | None = None, offs
         tables.points + scene.object.cof,
         tables.worst(cone, twist).loads,
     )
-
-
-def _cones(contacts: tuple[PointContact, ...], mu: float, offset: float, push: str) -> list[WrenchCone]:
-    """Of the fingers in the extreme places that they may have along their side."""
-    a, b = (replace(c, friction=mu) for c in contacts)
-    if offset == 0:
-        return [WrenchCone.of((a, b))]
-    along = perpendicular(a.normal)
-    if abs(float(a.normal @ b.normal) - 1) > PARALLEL or abs(float((b.point - a.point) @ a.normal)) > 1e-9:
-        raise InputError(
-            "an offset needs two fingers on one straight side", key=f"push {push!r}", value=offset
-        )
-    return [
-        WrenchCone.of([replace(c, point=c.point + s * offset * along) for c in (a, b)])
-        for s in (-1.0, 0.0, 1.0)
-    ]
 
 
 def _largest(tables: TableSet, motions: list[tuple[WrenchCone, Array]]) -> float:

@@ -97,6 +97,11 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
             claims.append(
                 Claim(f"{key} kept", None, value, least, bool(value >= least - ABSOLUTE), "at least as asked")
             )
+    if computed.set_margin is not None and plan.scene.planning.proof == "set":
+        kept = computed.set_margin >= -ABSOLUTE
+        claims.append(
+            Claim("set_margin kept", None, computed.set_margin, 0.0, kept, "on every table of the set")
+        )
     clearance = computed.clearance
     if clearance is not None:
         need = plan.scene.planning.clearance

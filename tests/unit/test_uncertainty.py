@@ -1,0 +1,101 @@
+"""Scenes that say how well pressure and friction are known: plans that hold on every table of that set."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.documents import load_plan
+from flatpush.documents.scene_reader import parse_scene
+from flatpush.geometry import perpendicular
+
+SCENE = {
+    "flatpush": "scene/1",
+    "units": {"length": "mm", "angle": "deg"},
+    "object": {
+        "outline": [[25, -17.5], [25, 17.5], [-25, 17.5], [-25, -17.5]],
+        "friction": 0.4,
+        "uncertainty": {"loads": 0.15, "friction": [0.35, 0.5], "offset": 0.3},
+    },
+    "pusher": {"fingers": 2, "spacing": 18},
+    "pushes": [{"name": "long", "at": [0, -17.5]}, {"name": "short", "at": [25, 0]}],
+    "start": [60, -120, 45],
+    "goal": [0, 0, 0],
+}
+
+
+def changed(**uncertainty):
+    return {**SCENE, "object": {**SCENE["object"], "uncertainty": uncertainty}}
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return fp.plan(parse_scene(SCENE))
+
+
+def test_a_plan_is_proved_for_the_set_that_the_scene_states(plan, tmp_path):
+    certificate = plan.certificate
+    assert certificate.set_margin >= 0
+    assert certificate.set_loads >= 0.15
+    again = fp.prove(plan, 0.15, friction=0.35, offset=0.0003)
+    assert again.proved
+    assert again.margin == pytest.approx(certificate.set_margin)
+    plan.save(tmp_path / "plan.json")
+    loaded = load_plan(tmp_path / "plan.json")
+    assert loaded.scene.object.uncertainty == fp.Uncertainty(0.15, (0.35, 0.5), 0.0003)
+    assert fp.verify(loaded).ok
+
+
+def test_a_nominal_plan_is_cheaper_and_fails_the_proof(plan):
+    scene = replace(plan.scene, planning=replace(plan.scene.planning, proof="nominal", friction_margin=0.0))
+    nominal = fp.plan(scene)
+    assert nominal.cost < plan.cost
+    assert nominal.certificate.set_margin < 0
+    believed = replace(nominal, scene=replace(scene, planning=replace(scene.planning, proof="set")))
+    assert "set_margin kept" in [claim.name for claim in fp.verify(believed).failed]
+
+
+def test_the_larger_the_set_the_wider_the_turns():
+    radii = []
+    for share in (0.0, 0.1, 0.3):
+        scene = parse_scene(changed(loads=share))
+        car = fp.Planner(scene).options[0].car
+        radii.append(car.radius)
+        assert car.straight[:2] @ perpendicular(car.left_centre - car.right_centre) == pytest.approx(
+            -np.linalg.norm(car.left_centre - car.right_centre), rel=1e-6
+        )
+    assert radii == sorted(radii)
+    assert radii[2] > 1.05 * radii[0]
+
+
+def test_one_finger_is_refused_with_what_would_do():
+    one = {**changed(loads=0.1), "pusher": {"fingers": 1}}
+    plan = fp.plan(parse_scene(one))
+    assert plan.status == "no_plan"
+    assert "one finger cannot be proved" in plan.reason
+    one["planning"] = {"proof": "nominal"}
+    assert fp.plan(parse_scene(one)).certificate.set_margin is None
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "message"),
+    [
+        ({"loads": 1.0}, "loads"),
+        ({"loads": -0.1}, "loads"),
+        ({"friction": [0.5, 0.6]}, "contains the object's own"),
+        ({"friction": [0.5, 0.3]}, "low"),
+        ({"offset": -1}, "offset"),
+        ({"weight": 0.1}, "unknown key"),
+    ],
+)
+def test_sets_that_make_no_sense(uncertainty, message):
+    with pytest.raises(fp.InputError, match=message):
+        parse_scene(changed(**uncertainty))
+
+
+def test_a_known_surface_has_no_loads():
+    scene = changed(loads=0.1)
+    scene["object"]["surface"] = {"ellipsoid": [[1, 0, 0], [0, 1, 0], [0, 0, 2000]]}
+    with pytest.raises(fp.InputError, match="no loads that could differ"):
+        parse_scene(scene)
