@@ -27,6 +27,8 @@ object:
   # surface: {ellipsoid: [[1, 0, 0], [0, 1, 0], [0, 0, 2500]]}
   # surface: {quartic: [15 coefficients]}
   # surface: {file: surface.json}
+  # How well pressure and friction are known; two-finger pushes then hold for all of it:
+  # uncertainty: {loads: 0.2, friction: [0.24, 0.4], offset: 0.5}
 
 pusher:
   fingers: 2                      # 1 or 2
@@ -61,6 +63,7 @@ goal: [0, 0, 0]
 planning:
   model: exact                    # friction with the table: exact, ellipsoid, local or quartic
   two_finger: cone                # cone: all that both fingers can do; middle: as one finger between them
+  proof: set                      # of an object with an uncertainty: on every table of the set, or on the nominal one
   cost: flat                      # what is kept short: flat (path of the car), pusher (its path) or time
   switch_cost: 30                 # of each change of contact, in the unit of the cost; 0 for pusher and time
   margin:

@@ -229,7 +229,6 @@ class Planning:
     model: Model = "exact"
     two_finger: Literal["cone", "middle"] = "cone"
     cost: Cost = "flat"
-    proof: Literal["set", "nominal"] = "set"  # of two fingers, where the object has an uncertainty
     switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
     friction_margin: float = 0.2
     clearance: float = 0.0
@@ -238,6 +237,7 @@ class Planning:
     seed: int = 0
     iterations: int = 10000
     time_limit: float = 5.0
+    proof: Literal["set", "nominal"] = "set"  # of two fingers, where the object has an uncertainty
 
     @property
     def switching(self) -> float:
