@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from flatpush.documents import load_scene
+from flatpush.documents import check_outputs, load_pairs, load_scene, parse_scene
 from flatpush.errors import InputError
 
 GOOD: dict[str, Any] = {
@@ -465,3 +465,36 @@ def test_valid_oddities_are_accepted(tmp_path: Path) -> None:
     assert scene.object.friction == 0
     # Edges count as written: edge 3 runs from (20, 10) to (0, 10) although a corner before it stands twice.
     assert scene.pushes[0].at.point.tolist() == [0.01, 0.01]
+
+
+def test_a_list_that_no_scene_has_is_refused_before_each_of_its_entries():
+    """10 MB of numbers for an outline took over a minute: each was an error of its own."""
+    document = {"flatpush": "scene/1", "object": {"outline": [1.5] * 200_000}}
+    with pytest.raises(InputError, match="at most 100000 entries, not 200000") as failure:
+        parse_scene(document)
+    assert failure.value.key == "object.outline"
+
+
+def test_measured_numbers_beyond_all_measure_are_bad_rows(tmp_path):
+    """1e308 ended in a singular value decomposition that did not converge."""
+    rows = ["fx,fy,tau,vx,vy,omega", *["1,0.2,0.01,0.02,0.003,0.1"] * 3, ",".join(["1e308"] * 6)]
+    file = tmp_path / "pairs.csv"
+    file.write_text("\n".join(rows) + "\n")
+    with pytest.raises(InputError, match="beyond 1e\\+09"):
+        load_pairs(file)
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_an_output_does_not_take_the_place_of_an_input(tmp_path, link):
+    scene, output = tmp_path / "scene.yaml", tmp_path / "scene.yaml"
+    scene.write_text("what the user had")
+    if link:
+        output = tmp_path / "figure.svg"
+        output.symlink_to(scene)
+    with pytest.raises(InputError, match="an input of this command"):
+        check_outputs([scene], [output])
+    same = tmp_path / "same.svg"
+    with pytest.raises(InputError, match="another output"):
+        check_outputs([scene], [same, None, tmp_path / "." / "same.svg"])
+    check_outputs([scene], [same, tmp_path / "other.svg"])
+    assert scene.read_text() == "what the user had"

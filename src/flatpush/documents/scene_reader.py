@@ -20,6 +20,7 @@ from .reading import join, plain, read_mapping
 from .refusals import checked, nearest
 
 # A pose whose angle is more than two turns was written in degrees.
+LONGEST = 100_000
 # Keys of the pusher that are lengths, or lengths over time.
 LENGTHS = (
     *("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"),
@@ -63,6 +64,7 @@ def parse_scene(document: Mapping[str, Any], source: str = "", key: str = "") ->
     >>> scene.object.outline.radius, scene.start.tolist()
     (0.04, [0.06, 0.02, 3.141592653589793])
     """
+    _check_lengths(document, source, key)
     raw = _checked_version(plain(document, source, key), source, key)
     model = checked(m.SceneModel, raw, source, key)
     return _scene(Context(source, key, raw, PER_METRE[model.units.length], model.units.angle == "deg"), model)
@@ -74,6 +76,16 @@ def _merged(document: Any, changes: Mapping[str, Any]) -> Any:
         old = result.get(key)
         result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, Mapping) else value
     return result
+
+
+def _check_lengths(value: object, source: str, key: str) -> None:
+    """Refuses lists that no scene has, before each of their entries is looked at."""
+    if isinstance(value, list | tuple) and len(value) > LONGEST:
+        rule = f"a list of a scene has at most {LONGEST} entries, not {len(value)}"
+        raise InputError(rule, source=source, key=key)
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            _check_lengths(item, source, join(key, str(name)))
 
 
 def _checked_version(raw: object, source: str, key: str) -> dict[str, Any]:
