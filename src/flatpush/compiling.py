@@ -41,9 +41,14 @@ def clock() -> float:
     return now - _spent - (now - _since if _depth else 0.0)
 
 
-def listen(listener: Callable[[Work], None]) -> None:
-    """Calls the listener when a kernel begins to be compiled, at each function within it, and when it is ready."""
+def listen(listener: Callable[[Work], None]) -> Callable[[], None]:
+    """Calls the listener when a kernel begins to be compiled, at each function within it, and when it is ready.
+
+    Returns:
+        what ends it.
+    """
     _listeners.append(listener)
+    return lambda: _listeners.remove(listener)
 
 
 def busy() -> bool:

@@ -34,15 +34,14 @@ def scene(kind):
 def two_pushes(asked):
     """Along one edge, then along the other, with a transit between."""
     from flatpush.planning import Planner
-    from flatpush.planning.assembly import Leg, assemble
+    from flatpush.planning.assembly import assemble
+    from flatpush.planning.path import Path
     from flatpush.simulation import certify
 
     planner = Planner(asked)
-    first, second = sorted(planner.usable, key=lambda option: option.push.name)
-    goals = (np.array([0.08, 0.0, 0.0]), np.array([0.0, 0.0, 0.0]))
-    ways = zip((first, second), goals, strict=True)
-    legs = [Leg(option, "LSR", np.array([0.0, 0.08, 0.0]), goal) for option, goal in ways]
-    segments = assemble(planner.scene, planner.transits, legs)
+    first, second = sorted(range(2), key=lambda k: planner.usable[k].push.name)
+    path = Path.of(planner.fleet, planner.scene.start_pose, [(first, 1, 0.08), (second, 1, 0.08)])
+    segments = assemble(planner.scene, planner.transits, planner.usable, path)
     certificate = certify(planner.scene, segments)
     return fp.Plan("solved", planner.scene, certificate.cost, certificate.duration, segments, certificate)
 

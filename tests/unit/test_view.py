@@ -727,7 +727,7 @@ def made_run(modes=("path", "saturated")):
     contacts = tuple("sticking" if k < n // 2 else "sliding_left" for k in range(n))
     moved = push.object + np.array([0.001, 0.0, 0.0])
     words = tuple(modes[k * len(modes) // n] for k in range(n))
-    return plan, ClosedLoopRun(push.times, moved, push.pusher, words, contacts, "arrived")
+    return plan, ClosedLoopRun(push.times, moved, push.pusher, np.zeros(n), words, contacts, "arrived")
 
 
 def test_a_run_under_feedback_shows_tolerance_contact_and_clearance():

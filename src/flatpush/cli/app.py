@@ -53,7 +53,7 @@ def _options(
 def main() -> None:
     """Runs a command; an error is one message on standard error, without a traceback."""
     warnings.showwarning = _show_warning
-    compiling.listen(CompilingNotice(sys.stderr))
+    silence = compiling.listen(CompilingNotice(sys.stderr))
     try:
         status = app(standalone_mode=False)
     except typer.Abort:
@@ -76,6 +76,8 @@ def main() -> None:
             error.show()
             sys.exit(2)
         raise
+    finally:
+        silence()
     sys.exit(status if isinstance(status, int) else 0)
 
 

@@ -116,8 +116,12 @@ def rollout(
                 outcome = 2
                 break
             psi = wrapped(heading - angle)
-            kappa, _ = along_path(e, psi, bend, gains[0], gains[1], left, right)
             out = min(speed, remaining / (dt * max(0.2, math.cos(psi))))
+            if length + out * dt < finish:
+                # The mean turn of what is driven in this tick, as path_following.path_command has it.
+                _, _, further, _ = place(table, length + out * dt)
+                bend = wrapped(further - angle) / (out * dt)
+            kappa, _ = along_path(e, psi, bend, gains[0], gains[1], left, right)
             omega = kappa * out
             off = abs(e)
         worst = max(worst, off)
