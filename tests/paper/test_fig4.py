@@ -37,11 +37,13 @@ def test_without_an_estimator_the_heading_settles_where_the_true_axle_says(r):
     assert closed == pytest.approx(BIAS[r], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", list(BIAS))
 def test_with_the_estimator_there_is_none(r):
     assert abs(np.rad2deg(fig4.learned_bias(r))) < 0.05
 
 
+@pytest.mark.slow
 def test_the_experiment_prints_both(tmp_path):
     table = experiment("fig4")(tmp_path)
     assert "paper prints" in table
