@@ -10,6 +10,7 @@ import yaml
 import flatpush as fp
 from flatpush.documents import parse_plan, plan_document
 from flatpush.errors import InputError
+from flatpush.problem import TransitSegment
 
 EDITS = yaml.safe_load((Path(__file__).parents[1] / "data" / "plan_edits.yaml").read_text())
 BLOCK = [(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)]
@@ -157,6 +158,16 @@ def test_yaw_goes_on_through_the_whole_plan(start):
     yaw = np.concatenate([segment.pusher[:, 2] for segment in plan.segments])
     assert np.max(np.abs(np.diff(yaw))) < 0.2
     assert fp.verify(plan).ok, fp.verify(plan).failed
+
+
+def test_whole_turns_are_taken_over_from_the_segment_before():
+    from flatpush.planning.assembly import following
+
+    before = TransitSegment(np.zeros(1), np.array([[0.1, 0.2, 9.0]]), np.zeros(1))
+    after = TransitSegment(
+        np.arange(2.0), np.array([[0.1, 0.2, 9.0 - 4 * np.pi], [0.1, 0.3, 9.5 - 4 * np.pi]]), np.zeros(2)
+    )
+    assert following(after, before).pusher[:, 2] == pytest.approx([9.0, 9.5])
 
 
 def test_limits_are_kept_by_differences_of_the_samples(documents):
