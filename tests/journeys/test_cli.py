@@ -198,12 +198,10 @@ def test_interrupting_leaves_no_file(folder):
 
 @pytest.mark.slow
 def test_interrupting_a_search_among_obstacles_keeps_the_best_plan(folder):
-    maze = (
-        (ROOT / "examples" / "maze.yaml")
-        .read_text(encoding="utf-8")
-        .replace("time_limit: 2", "time_limit: 600")
+    maze = (ROOT / "examples" / "maze.yaml").read_text(encoding="utf-8")
+    (folder / "maze.yaml").write_text(
+        maze.replace("planning: {", "planning: {iterations: 1000000, time_limit: 600, ")
     )
-    (folder / "maze.yaml").write_text(maze.replace("planning: {", "planning: {iterations: 1000000, "))
     flatpush("plan", "maze.yaml", "--time-limit", "0.01", folder=folder)  # compiles, if need be
     ended, errors = interrupted(["plan", "maze.yaml", "-o", "plan.json"], folder, 15)
     assert ended == 0, errors
