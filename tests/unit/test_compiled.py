@@ -141,7 +141,8 @@ def test_a_shared_function_is_compiled_once_and_called_by_its_address(own_store)
     again = kernel()(callers[0].py_func)
     assert again(2.0) == 5.0
     assert again.stats.cache_hits
-    assert compiled.shared(1.0, 1.0)(there["helper"]).made.cache_hits == 1
+    compiled.shared(1.0, 1.0)(there["helper"])  # known by what it computes: no second file
+    assert sum(name.startswith("helper") for name in os.listdir(own_store)) == 1
 
 
 def test_fields_of_named_tuples_are_part_of_a_signature():
