@@ -71,11 +71,12 @@ def python_blocks() -> list[tuple[str, str]]:
 @pytest.mark.parametrize(
     ("name", "block"), python_blocks(), ids=lambda value: value if "\n" not in value else ""
 )
-def test_the_python_in_the_documents_runs(name, block, tmp_path, monkeypatch):
+def test_the_python_in_the_documents_runs(name, block, tmp_path, monkeypatch, capsys):
     for folder in ("examples", "docs"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, name, "exec"), {"__name__": name})
+    assert capsys.readouterr().out or "assert " in block  # a reader sees what it does
 
 
 def test_every_file_and_test_that_the_documents_name_exists():
@@ -215,6 +216,69 @@ def test_no_function_has_more_than_twelve_parameters():
         if count > 12 and not name.startswith("cli."):
             long.add(name)
     assert long <= LONG
+
+
+ASSERTING = {"raises", "warns", "fail", "skip", "importorskip", "assert_allclose", "assert_array_equal"}
+
+
+def called(node: ast.expr | None) -> str:
+    return ast.unparse(node.func).split(".")[-1] if isinstance(node, ast.Call) else ""
+
+
+def silent(body: list[ast.stmt], asserting: set[str]) -> set[str]:
+    """How statements can end with nothing asserted: they fall through, leave the function, or jump in a loop."""
+    ways = {"fall"}
+    for statement in body:
+        if "fall" in ways:
+            ways = ways - {"fall"} | silently(statement, asserting)
+    return ways
+
+
+def silently(statement: ast.stmt, asserting: set[str]) -> set[str]:
+    match statement:
+        case ast.Assert() | ast.Raise():
+            return set()
+        case ast.Expr(value=value) if called(value) in asserting:
+            return set()
+        case ast.Return(value=value):
+            return set() if called(value) in asserting else {"leave"}
+        case ast.Continue() | ast.Break():
+            return {"jump"}
+        case ast.If():
+            return silent(statement.body, asserting) | silent(statement.orelse, asserting)
+        case ast.For(iter=over):
+            inside = silent(statement.body, asserting)
+            may_be_empty = any(part.ifs for part in getattr(over, "generators", []))
+            return inside & {"leave"} | ({"fall"} if may_be_empty or inside - {"leave"} else set())
+        case ast.While():
+            return silent(statement.body, asserting) & {"leave"} | {"fall"}
+        case ast.With(items=items):
+            checks = any(called(item.context_expr) in asserting for item in items)
+            return set() if checks else silent(statement.body, asserting)
+        case ast.Try():
+            last = silent(statement.finalbody, asserting)
+            return last and silent(statement.body, asserting)
+    return {"fall"}
+
+
+def silent_tests(text: str) -> list[str]:
+    """Names of the tests in a file that can pass with nothing asserted; a helper that always asserts counts."""
+    found = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+    asserting = set(ASSERTING)
+    for _ in found:
+        asserting |= {node.name for node in found if not silent(node.body, asserting)}
+    return [node.name for node in found if node.name.startswith("test_") and node.name not in asserting]
+
+
+def test_no_test_passes_with_nothing_asserted():
+    loud = "def test_a(x):\n    {}\n"
+    assert not silent_tests(loud.format("assert x"))
+    for quiet in ("if x: assert x", "for y in x:\n        if y: continue\n        assert y", "return", "x()"):
+        assert silent_tests(loud.format(quiet)) == ["test_a"]
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    assert not {
+        (path.name, name) for path in files for name in silent_tests(path.read_text(encoding="utf-8"))
+    }
 
 
 def test_any_does_not_spread():

@@ -1,6 +1,7 @@
 """The pusher alone: over the object and around it."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -43,18 +44,15 @@ def test_around_a_concave_object_without_touching_it(fingers):
     scene = scene_of(L_SHAPE, fingers)
     transits, places = Transits(scene), placements(scene)
     tips = np.zeros((1, 2)) if fingers == 1 else np.array([[0, 0.006], [0, -0.006]])
-    for i, a in enumerate(places):
-        for j, b in enumerate(places):
-            if i == j:
-                continue
-            way = transits.between(a, b)
-            assert way.poses[0] == pytest.approx(a.pose)
-            assert way.poses[-1][:2] == pytest.approx(b.pose[:2])
-            assert np.cos(way.poses[-1][2] - b.pose[2]) == pytest.approx(1)
-            distance = gaps(scene, way, tips)
-            assert distance.min() > -1e-8
-            inner = replace_ends(way)
-            assert gaps(scene, inner, tips).min() > 0.9e-3
+    for a, b in permutations(places, 2):
+        way = transits.between(a, b)
+        assert way.poses[0] == pytest.approx(a.pose)
+        assert way.poses[-1][:2] == pytest.approx(b.pose[:2])
+        assert np.cos(way.poses[-1][2] - b.pose[2]) == pytest.approx(1)
+        distance = gaps(scene, way, tips)
+        assert distance.min() > -1e-8
+        inner = replace_ends(way)
+        assert gaps(scene, inner, tips).min() > 0.9e-3
 
 
 def test_around_the_object_the_fingers_keep_the_clearance_of_the_scene():

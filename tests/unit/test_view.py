@@ -466,6 +466,10 @@ def test_a_circle_with_one_finger_and_pushes_without_a_list(tmp_path):
     scene = replace(plan.scene, object=disc, pushes="auto", pusher=Pusher())
     for ending in ("svg", "gif", "html"):
         save_figure(replace(plan, scene=scene, segments=segments), tmp_path / f"disc.{ending}")
+    page = page_data((tmp_path / "disc.html").read_text(encoding="utf-8"))
+    assert all(segment["tips"] == [[0, 0]] for segment in page["segments"] if segment["push"])
+    two = svg_of(plan, tmp_path).count("<circle")
+    assert two > (tmp_path / "disc.svg").read_text(encoding="utf-8").count("<circle") > 0
 
 
 # What is refused
@@ -572,6 +576,11 @@ def test_far_and_single_contacts_are_drawn(tmp_path):
     far = sketch(left_centre=1e2 * LEFT, right_centre=1e2 * RIGHT)
     single = sketch(contact_points=np.array([[0.0, -0.0095]]), fingertips=np.array([[0.0, -0.012]]))
     ElementTree.fromstring(drawn([far, single], tmp_path))
+    discs = drawn([sketch()], tmp_path).count("<circle")
+    assert drawn([far], tmp_path).count("<circle") == discs - 2  # its turning centres lie off the page
+    assert (
+        drawn([single], tmp_path).count("<circle") == discs - 4
+    )  # a fingertip and its contact, in two panels
 
 
 def test_centres_of_a_curve_are_told_apart_by_theirsense():
