@@ -142,3 +142,23 @@ def test_a_finger_in_a_slot_backs_straight_out_or_not_at_all():
     assert gaps(scene, Transits(scene).between(floor, outside), np.zeros((1, 2))).min() > -1e-8
     with pytest.raises(FlatpushError, match="in the fingers' way"):
         Transits(scene).between(wall, outside)
+
+
+def test_a_finger_that_rolled_along_leaves_square_to_the_outline():
+    """It left against its direction, through the object that had turned under it (scene 39 of tests/fuzz.py)."""
+    square = [(-0.02, -0.02), (0.02, -0.02), (0.02, 0.02), (-0.02, 0.02)]
+    for transit in ("planar", "lift"):
+        scene = scene_of(square, transit=transit, turns=False)
+        below = placement_of(scene, fp.Push("p", scene.object.outline.at(0, 0.5)))
+        turned = np.array([0.0, 0.0, np.deg2rad(110)])
+        way = Transits(scene).landing(replace(below, pose=below.pose + turned)).reversed()
+        assert way.poses[1] == pytest.approx(below.pose + turned - [0.0, 0.002, 0.0])
+        assert gaps(scene, way, np.zeros((1, 2))).min() > -1e-12
+
+
+def test_a_finger_that_rolled_into_a_notch_does_not_leave_through_its_wall():
+    notch = [(0, 0), (0.06, 0), (0.06, 0.04), (0.04, 0.04), (0.03, 0.02), (0.029, 0.04), (0, 0.04)]
+    scene = scene_of(notch, turns=False, tip_radius=0.001, approach=0.006)
+    wall = placement_of(scene, fp.Push("p", scene.object.outline.at(3, 0.5)))
+    with pytest.raises(FlatpushError, match="in the fingers' way"):
+        Transits(scene).landing(wall)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact import Placement, two_point_sticks
 from ..errors import FlatpushError, InputError
-from ..geometry import shift_twist, transform
+from ..geometry import compose, shift_twist
 from ..problem import Push, Scene
 from ..problem.mechanics import (
     cone_motions,
@@ -20,6 +20,7 @@ from ..problem.mechanics import (
 )
 from ..problem.scene import Model
 from ..steering.car import Car
+from .transits import backs_off
 
 SLACK = 1e-6
 
@@ -105,11 +106,10 @@ def _check_composite(scene: Scene, placement: Placement, car: Car, model: Model)
 
 def _check_landing(scene: Scene, placement: Placement) -> None:
     """The fingers land clear of the object, a little back along the push direction."""
-    back = transform([0.0, 0.0, placement.pose[2]], [-scene.pusher.approach, 0.0])
-    for tip in placement.tips:
-        if scene.object.outline.nearest(tip + back).distance < scene.pusher.tip_radius - 1e-9:
-            raise InputError(
-                "a finger would land on the object",
-                value=scene.pusher.approach,
-                hint="Use another approach distance.",
-            )
+    back = compose(placement.pose, [-scene.pusher.approach, 0.0, 0.0])
+    if not backs_off(scene.object.outline, placement, back, scene.pusher.tip_radius):
+        raise InputError(
+            "a finger would land on the object",
+            value=scene.pusher.approach,
+            hint="Use another approach distance.",
+        )

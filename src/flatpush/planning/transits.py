@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contact import Placement
 from ..errors import FlatpushError
-from ..geometry import Outline, compose, inverse, transform, wrap_angle
+from ..geometry import Outline, compose, wrap_angle
 from ..geometry.pose import Array
 from ..problem import Pusher, Scene, TransitSegment
 from .segments import SAG, SAG_ANGLE
@@ -95,6 +95,17 @@ class Way:
         )
 
 
+def backs_off(outline: Outline, placement: Placement, back: Array, tip_radius: float) -> bool:
+    """Whether the fingertips stay off the object while the hand goes straight from a contact to a pose X_OE."""
+    import shapely
+
+    shape = shapely.Point(outline.centre) if outline.is_circle else shapely.Polygon(outline.vertices)
+    ways = shapely.linestrings(
+        np.stack([placement.tips, placement.tips + (back - placement.pose)[:2]], axis=1)
+    )
+    return bool(np.all(shapely.distance(shape, ways) >= tip_radius + outline.radius - 1e-9))
+
+
 class Transits:
     """The pusher's ways around one object, in O.
 
@@ -107,8 +118,14 @@ class Transits:
         self.gap = max(scene.planning.clearance, LEAST_GAP)
 
     def landing(self, placement: Placement) -> Way:
-        """From above the landing place (planar: from beside) onto the contact, straight along the push direction."""
-        back = self._back(placement)
+        """From above the landing place (planar: from beside) onto the contact, straight along the push direction.
+
+        A finger that keeps its direction comes square to the outline where it touches.
+
+        Raises:
+            FlatpushError: if a part of the object is in the way.
+        """
+        back = self._back(placement, self.pusher.approach)
         poses, heights = [back, placement.pose], [0.0, 0.0]
         if self.pusher.transit == "lift":
             poses, heights = [back, *poses], [self.pusher.lift, *heights]
@@ -118,10 +135,10 @@ class Transits:
         """From one contact to another.
 
         Raises:
-            FlatpushError: if there is no way on the table.
+            FlatpushError: if there is no way on the table, or a part of the object is in the way.
         """
         reach = max(self._reach(first), self._reach(second))
-        a, b = self._back(first), self._back(second)
+        a, b = (self._back(placement, self.pusher.approach) for placement in (first, second))
         turn = float(wrap_angle(b[2] - a[2]))
         b = np.array([b[0], b[1], a[2] + turn])
         end = np.array([*second.pose[:2], b[2]])
@@ -137,8 +154,19 @@ class Transits:
         poses = np.concatenate([[first.pose], middle, [end]])
         return Way(poses, np.zeros(len(poses)), reach)
 
-    def _back(self, placement: Placement) -> Array:
-        return compose(placement.pose, [-self.pusher.approach, 0.0, 0.0])
+    def _back(self, placement: Placement, distance: float) -> Array:
+        """The pose X_OE at a distance straight back from a contact."""
+        if self.pusher.turns:
+            return compose(placement.pose, [-distance, 0.0, 0.0])
+        # The finger has rolled along, so that its own direction says nothing, nor what was checked of its push.
+        normal = self.outline.nearest(placement.pose[:2]).normal
+        back = placement.pose - distance * np.array([*normal, 0.0])
+        self._check(placement, back)
+        return back
+
+    def _check(self, placement: Placement, back: Array) -> None:
+        if not backs_off(self.outline, placement, back, self.pusher.tip_radius):
+            raise FlatpushError("a part of the object is in the fingers' way when they back away")
 
     def _reach(self, placement: Placement) -> float:
         return float(np.max(np.linalg.norm(placement.tips - placement.pose[:2], axis=1)))
@@ -146,18 +174,13 @@ class Transits:
     def _clear(self, placement: Placement, reach: float) -> Array:
         """Straight back from a contact until the hand may turn freely beside the object."""
         need = WIDER * (reach + self.pusher.tip_radius + self.gap)
-        tips = transform(inverse(placement.pose), placement.tips)
         distance, pose = 0.0, placement.pose
         while self.outline.nearest(pose[:2]).distance < need + 1e-9:
             distance += 0.25 * self.gap + max(0.0, 0.5 * (need - self.outline.nearest(pose[:2]).distance))
             if distance > 4 * self.outline.size + 2 * need:
                 raise FlatpushError("the fingers cannot back away from the object far enough to turn")
-            pose = compose(placement.pose, [-distance, 0.0, 0.0])
-        for share in np.linspace(0.0, 1.0, max(2, int(np.ceil(distance / self.gap)) + 1))[1:]:
-            back = compose(placement.pose, [-share * distance, 0.0, 0.0])
-            for tip in transform(back, tips):
-                if self.outline.nearest(tip).distance < self.pusher.tip_radius - 1e-9:
-                    raise FlatpushError("a part of the object is in the fingers' way when they back away")
+            pose = self._back(placement, distance)
+        self._check(placement, pose)
         return pose
 
     @cached_property

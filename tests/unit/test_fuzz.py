@@ -1,0 +1,79 @@
+"""The check of tests/fuzz.py sees what is wrong, and finds nothing in random scenes."""
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+
+from ..fuzz import check, exported, main
+
+
+@pytest.fixture(scope="module")
+def honest(tmp_path_factory):
+    """A plan with a wall beside its way, and its exported rows."""
+    thing = fp.Object([(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)], friction=0.4)
+    wall = [(0.06, -0.2), (0.07, -0.2), (0.07, 0.2), (0.06, 0.2)]
+    scene = fp.Scene(
+        thing,
+        (0.01, -0.12, 0.3),
+        pusher=fp.Pusher(fingers=2, spacing=0.015),
+        workspace=fp.Workspace((-0.3, -0.3, 0.3, 0.3), [wall]),
+        planning=fp.Planning(iterations=300, time_limit=1000, clearance=0.002),
+    )
+    return exported(fp.plan(scene), tmp_path_factory.mktemp("fuzz"))
+
+
+def test_an_honest_file_has_no_fault(honest):
+    assert list(check(*honest)) == []
+
+
+def shift(column, amount, part):
+    def edit(rows):
+        rows[part, column] += amount
+
+    return edit
+
+
+def slower(rows):
+    rows[:, 0] *= 0.99
+
+
+# Rows in the first transit, in the push, and all of them.
+LANDING, PUSH, ALL = slice(5, 8), slice(-40, -39), slice(None)
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (shift(0, -5.0, LANDING), "times"),
+        (slower, "times"),
+        (shift(1, 1e-3, PUSH), "fingertip speed"),
+        (shift(1, 1e-4, PUSH), "fingertip acceleration"),
+        (shift(4, 0.2, PUSH), "turn rate"),
+        (shift(4, 2 * np.pi, slice(-30, None)), "turn rate"),
+        (shift(3, -1e-3, PUSH), "heights"),
+        (shift(3, 0.1, slice(0, 1)), "heights"),
+        (shift(1, 1e-3, LANDING), "on the way up or down"),
+        (shift(2, -2e-4, ALL), "off the object"),
+        (shift(2, 2e-4, ALL), "in the object"),
+        (shift(1, 0.05, ALL), "a fingertip has"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_seen(honest, edit, words):
+    plan, rows = honest
+    rows = rows.copy()
+    edit(rows)
+    assert any(words in fault for fault in check(plan, rows)), list(check(plan, rows))
+
+
+def test_an_object_too_near_to_a_wall_and_beside_its_goal_is_seen(honest):
+    plan, rows = honest
+    near = plan["scene"] | {"planning": {**plan["scene"]["planning"], "margin": {"clearance": 0.03}}}
+    assert any("the object has" in fault for fault in check(plan | {"scene": near}, rows))
+    far = plan["scene"] | {"goal": [0.0006, 0.0, 0.0]}
+    assert any("from the goal" in fault for fault in check(plan | {"scene": far}, rows))
+
+
+@pytest.mark.slow
+def test_random_scenes_have_no_fault(capsys):
+    assert main(20, 5000) == 0, capsys.readouterr().out
