@@ -3,6 +3,7 @@
 import itertools
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -185,3 +186,27 @@ def test_fingers_on_a_touch_screen_play_pause_and_scrub(page, plan):
     for kind, share in (("touchStart", 0.2), ("touchMove", 0.5), ("touchMove", 0.75), ("touchEnd", 0.75)):
         touch(kind, box["x"] + share * box["width"], box["y"] + box["height"] / 2)
     wait(browser, lambda: abs(time_shown(browser) / plan.duration - 0.75) < 0.05)
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE])
+def test_pushes_have_numbers_that_do_not_hide_each_other(browser, tmp_path, size):
+    plan = fp.plan(fp.load_scene(Path(__file__).parents[2] / "examples" / "triangle.yaml"))
+    assert len(plan.pushes) > 1
+    save_figure(plan, tmp_path / "plan.html")
+    metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    browser.get((tmp_path / "plan.html").as_uri() + "#t=0")
+    discs = browser.execute_script(
+        "return [...document.querySelectorAll('.number')].map((n) => { const b = n.firstChild.getBoundingClientRect();"
+        " const letters = n.querySelector('text').getBoundingClientRect().height;"
+        " return [n.textContent, b.left, b.top, b.right, b.bottom, letters]; });"
+    )
+    assert [disc[0] for disc in discs] == [str(k + 1) for k in range(len(plan.pushes))]
+    middles = [((left + right) / 2, (top + bottom) / 2) for _, left, top, right, bottom, _ in discs]
+    for _, left, _, right, _, letters in discs:
+        assert right - left >= 18
+        assert letters >= 11
+        assert left >= 0
+        assert right <= size[0]
+    for (x, y), (u, v) in itertools.combinations(middles, 2):
+        assert np.hypot(x - u, y - v) >= 20

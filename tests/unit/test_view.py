@@ -312,8 +312,12 @@ def test_the_box_of_a_text_is_what_its_letters_cover():
         assert bottom - 6 < ends[3] < bottom + 1
 
 
-def test_the_goal_and_start_labels_lie_on_no_line():
+@pytest.mark.parametrize("edge", [0.06, 0.3])
+def test_the_goal_and_start_labels_lie_on_no_line(edge):
+    """Bounds are lines too; at 0.06 they run where the label of the goal would be liked best."""
     plan = make_plan(pushes=2)
+    top = float(np.max(transform(plan.scene.goal_pose, TRIANGLE)[:, 1])) + 0.004
+    plan = make_plan(pushes=2, bounds=(-0.6, -0.4, 0.6, top if edge < 0.1 else edge + top))
     page = draw_plan(plan)
     lines = [item.points for _, item in page.items() if isinstance(item, Line) and item.look.width >= 1.4]
     for name in ("start", "goal"):
@@ -323,6 +327,28 @@ def test_the_goal_and_start_labels_lie_on_no_line():
             dense = np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(points)])
             inside = (dense > [left, top]) & (dense < [right, bottom])
             assert not np.any(inside.all(axis=1)), name
+
+
+@pytest.mark.parametrize(("pushes", "beside"), [(1, True), (9, False)])
+def test_the_strip_stands_beside_the_axes_where_it_finds_room_and_on_the_page(pushes, beside):
+    """One push once had the whole width of the page for its strip, under a picture with an empty margin."""
+    page = draw_plan(make_plan(("left", "straight", "left"), pushes=pushes))
+    texts = page.texts()
+    (head,) = (t for t in texts if t.text == STRIP)
+    (axis,) = (t for t in texts if t.text == "x [mm]")
+    assert (head.y < axis.y) == beside
+    names = [t for t in texts if t.text == "long edge"]
+    assert len(names) == pushes
+    assert all(t.box[2] <= page.width and t.box[3] <= page.height for t in texts)
+
+
+@pytest.mark.parametrize(("turns", "seen"), [(("left", "straight", "right"), True), (("left",), False)])
+def test_turning_centres_outside_the_picture_are_neither_drawn_nor_explained(turns, seen):
+    """Half a sign once stood at the edge."""
+    page = draw_plan(make_plan(turns))
+    signs = [item for _, item in page.items() if isinstance(item, Disc) and item.radius == 3.6]
+    assert len(signs) == (1 if seen else 0)
+    assert ("turning centre (+ left, − right)" in {t.text for t in page.texts()}) == seen
 
 
 def test_colours_of_pushes_never_repeat():
@@ -583,6 +609,49 @@ def test_far_and_single_contacts_are_drawn(tmp_path):
     )  # a fingertip and its contact, in two panels
 
 
+def test_the_drawing_of_an_outline_is_shown_with_what_was_left_out(tmp_path):
+    from flatpush.documents import load_scene, outline_note
+
+    (tmp_path / "part.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100">'
+        '<rect x="10" y="10" width="60" height="40"/><circle cx="30" cy="30" r="5"/>'
+        '<path d="M 0 90 H 90" stroke="#000"/></svg>'
+    )
+    (tmp_path / "scene.yaml").write_text(
+        "flatpush: scene/1\nunits: {length: mm, angle: deg}\nobject: {outline: {file: part.svg,"
+        " origin: centroid}, friction: 0.3}\nstart: [0, 0, 0]\ngoal: [50, 0, 0]\n"
+    )
+    scene, note = load_scene(tmp_path / "scene.yaml"), outline_note(tmp_path / "scene.yaml")
+    page = draw_sketches(scene, [sketch(refusal="off")], note)
+    said = " ".join(t.text for t in page.texts())
+    for words in (
+        "the drawing",
+        "x of O",
+        "inside the outline (a hole)",
+        "an open line",
+        "unit of the drawing",
+    ):
+        assert words in said
+    grey = [
+        item.points for _, item in page.items() if isinstance(item, Line) and item.look.stroke == "#9a9a9a"
+    ]
+    assert sorted(len(points) > 2 for points in grey) == [False, True]  # the open line, the hole
+    plain = draw_sketches(scene, [sketch(refusal="off")])
+    assert plain.height < page.height
+    assert "the drawing" not in {t.text for t in plain.texts()}
+
+
+def test_a_cone_in_a_notch_is_as_long_as_the_object_is_deep():
+    """The middle of two contacts in the notch of an L lies off the object; its cone was drawn 5 mm long."""
+    corners = 1e-3 * np.array([(0, 0), (60, 0), (60, 20), (20, 20), (20, 60), (0, 60)])
+    scene = Scene(Object(Outline.polygon(corners), friction=0.3), (0, 0, 0))
+    length = cone_length(scene, np.array([0.025, 0.025]), [1.3 * np.pi])
+    assert length == pytest.approx(
+        min(0.4 * scene.object.outline.size, 0.025 / np.sin(0.3 * np.pi)), rel=1e-6
+    )
+    assert cone_length(scene, np.array([0.03, 0.0]), [np.pi / 2]) == pytest.approx(0.02)
+
+
 def test_centres_of_a_curve_are_told_apart_by_theirsense():
     """A centre to the left of a push along +y is of a counter-clockwise turn."""
     centres = np.array([[-0.2, 0.03], [-9.0, 0.03], [np.nan, np.nan], [9.0, 0.03], [0.2, 0.03]])
@@ -723,6 +792,16 @@ def test_every_end_is_shown_and_an_ellipse_only_where_there_is_one(tmp_path):
         assert image.width == 1200
 
 
+def test_the_ellipse_of_the_ends_is_shown_whole_and_a_line_has_none():
+    runs, line = made_runs(0.002), made_runs(0.002)
+    half = np.sqrt(5.991 * np.diag(runs.covariance)[:2])
+    box = np.array(ends_box(runs))
+    assert np.all(1e3 * (runs.mean[:2] - half) > box[:2])
+    assert np.all(1e3 * (runs.mean[:2] + half) < box[2:])
+    line.final[:, 1] = line.final[0, 1] + 1e-3 * (line.final[:, 0] - line.final[0, 0])
+    assert "mean (+)" in {t.text for t in draw_tube(line).texts()}
+
+
 def test_ends_far_off_are_counted_where_they_are_not_shown():
     runs = made_runs(0.002)
     runs.final[0, 0] += 1.0
@@ -743,12 +822,31 @@ def test_a_run_under_feedback_shows_tolerance_contact_and_clearance():
     plan, run = made_run()
     page = draw_track(plan, run, "path at 100 Hz")
     said = {t.text for t in page.texts()}
-    assert {"goal tolerance", "sticks", "slides to the left", "path", "saturated", "clearance"} <= said
+    assert {
+        "goal tolerance",
+        "sticks",
+        "slides to the left",
+        "path",
+        "saturated",
+        "clearance of the object",
+    } <= said
     assert "off the object" not in said  # it never was
     gaps = clearances(plan.scene, run.object)
     corners = transform(run.object[:, None], TRIANGLE[None])
     np.testing.assert_allclose(gaps, 0.2 - corners[..., 0].max(axis=1), atol=1e-12)
     assert f"least clearance {1e3 * gaps.min():.1f} mm" in said
+
+
+def test_what_is_too_short_to_be_seen_is_not_in_the_legend():
+    plan, run = made_run()
+    contacts = ("rest", *run.contacts[1:])
+    stretched = replace(run, contacts=contacts)
+    assert "at rest" in {t.text for t in draw_track(plan, stretched).texts()}
+    many = ClosedLoopRun(
+        np.linspace(0, 9, 2000), np.repeat(run.object[:1], 2000, 0), np.repeat(run.pusher[:1], 2000, 0),
+        np.zeros(2000), ("path",) * 2000, ("rest", *("sticking",) * 1999), "arrived",
+    )  # fmt: skip
+    assert "at rest" not in {t.text for t in draw_track(plan, many).texts()}
 
 
 def test_modes_of_a_controller_have_a_colour_each():

@@ -31,7 +31,7 @@ def command(
         from ..view import describe_figure
         from ..view.sketches import sketches
 
-        describe_figure(asked, sketches(asked, pushes), figure)
+        describe_figure(asked, sketches(asked, pushes), figure, note)
     data = {
         "object": asked.object.name,
         "outline": None if note is None else note.data(),

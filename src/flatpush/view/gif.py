@@ -11,11 +11,20 @@ from ..problem import Plan, PushSegment, Rollout
 from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Drawing, Look
-from .labels import Labels
-from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
-from .panel import BOTTOM, LEFT, Panel, frame_for
+from .labels import Labels, along
+from .legend import EDGE, TITLE, Entry, draw_legend, draw_title, frame_and_legend, legend_height, title_height
+from .panel import BOTTOM, Panel
 from .raster import Canvas
-from .table import MM, draw_endpoints, draw_object, draw_workspace, tip_size, view_box, what_is_drawn
+from .table import (
+    MM,
+    draw_endpoints,
+    draw_number,
+    draw_object,
+    draw_workspace,
+    tip_size,
+    view_box,
+    what_is_drawn,
+)
 from .timeline import Timeline, doing
 from .trace import fingers_at, fingertips, orientation_mark, rollout_paths, trace_pushes
 
@@ -53,7 +62,6 @@ def _background(plan: Plan, rollouts: Sequence[Rollout]) -> tuple[Drawing, Panel
     title, subtitle = words.plan_title(plan), words.plan_subtitle(plan)
     box = view_box(plan, traces, rollouts)
     top = title_height(title, subtitle) + 14.0  # a line for what goes on
-    frame = frame_for(box, EDGE + LEFT, top, PAGE - LEFT - 2 * EDGE, 110.0, 300.0)
     several = len(traces) > 1
     entries = [
         Entry(words.push_label(t.number, t.segment, several), Look(palette.push_colour(t.number), 1.9))
@@ -61,10 +69,12 @@ def _background(plan: Plan, rollouts: Sequence[Rollout]) -> tuple[Drawing, Panel
     ]
     entries += [Entry("fingers (white: lifted)", Look(palette.PUSHER), "dot")] if traces else []
     entries += [Entry(words.SIMULATED, Look(palette.SIMULATED, 1.2, RUN))] if rollouts else []
-    below = frame[3] + BOTTOM + 4
-    page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    frame, legend = frame_and_legend(box, entries, top, 300.0)
+    bottom = max(frame[3] + BOTTOM, legend[1] + legend_height(entries, legend[2]))
+    right = max(frame[2], legend[0] + legend[2], EDGE + d.text_width(title, TITLE, bold=True))
+    page = Drawing(min(right + EDGE, PAGE), bottom + EDGE, title)
     draw_title(page, title, subtitle)
-    draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
+    draw_legend(page, entries, *legend)
     panel = Panel(page, frame, box)
     panel.axes()
     draw_workspace(panel, scene)
@@ -74,7 +84,11 @@ def _background(plan: Plan, rollouts: Sequence[Rollout]) -> tuple[Drawing, Panel
             draw_object(panel, scene, pose, Look(colour, 0.6, opacity=0.22))
         if trace.flat_path is not None:
             panel.line(MM * trace.flat_path, Look(colour, 1.8, opacity=0.8), 3)
-    draw_endpoints(panel, plan, Labels(panel, what_is_drawn(plan, traces)))
+    labels = Labels(panel, what_is_drawn(plan, traces))
+    for trace in traces if several else ():
+        path = MM * transform(trace.segment.object, scene.object.cof)
+        draw_number(page, labels.place(13.0, 13.0, along(panel, path), free=True), trace.number)
+    draw_endpoints(panel, plan, labels)
     for rollout in rollouts:
         for path in rollout_paths(rollout, plan, traces):
             panel.line(MM * path, Look(palette.SIMULATED, 1.0, RUN), 4)

@@ -68,11 +68,11 @@ def along(panel: Panel, path: Array, share: float = 0.5) -> list[Array]:
     return [*on, *(places[0] + radius * side for radius in (12.0, 20.0, 30.0, 45.0) for side in ring)]
 
 
-def dense(corners: Array) -> Array:
-    """Points along the sides of a polygon, twenty-four to a side of a simple one, fewer where it has many sides."""
-    n = max(2, min(24, 400 // len(corners)))
-    s = np.arange(n)[:, None, None] / n
-    return ((1 - s) * corners + s * np.roll(corners, -1, axis=0)).reshape(-1, 2)
+def dense(line: Array, step: float) -> Array:
+    """Points (m, 2) along a line (n, 2), no further apart than a step."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    s = np.linspace(0.0, way[-1], 1 + max(1, int(np.ceil(way[-1] / step))))
+    return np.stack([np.interp(s, way, line[:, k]) for k in (0, 1)], axis=1)
 
 
 def _overlap(a: Box, b: Box) -> float:

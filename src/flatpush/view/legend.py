@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from . import drawing as d
-from .drawing import INK, SOFT, Drawing, Look
+from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
+from .panel import BOTTOM, LEFT, frame_for
 
 LINE = 14.0  # height of a line of the legend [pt]
 SIZE = 8.0
@@ -46,6 +47,22 @@ def draw_title(page: Drawing, title: str, subtitle: str) -> None:
 def legend_height(entries: Sequence[Entry], width: float) -> float:
     """Room that the legend needs [pt]."""
     return LINE * len(_rows(entries, width)) if entries else 0.0
+
+
+def frame_and_legend(
+    box: Box, entries: Sequence[Entry], top: float, highest: float = 330.0
+) -> tuple[Box, tuple[float, float, float]]:
+    """The frame of axes that show a box, and where their legend is: left, top, width [pt].
+
+    Axes that are too high to be as wide as the page have it at their right instead of an empty margin.
+    """
+    full = PAGE - LEFT - 2 * EDGE
+    frame = frame_for(box, EDGE + LEFT, top, full, 110.0, highest)
+    if not entries or frame[2] - frame[0] >= 0.9 * full:
+        return frame, (EDGE, frame[3] + BOTTOM + 4, PAGE - 2 * EDGE)
+    width = max(entry.width for entry in entries)
+    frame = frame_for(box, EDGE + LEFT, top, full - width - 16.0, 110.0, 1.15 * highest)
+    return frame, (frame[2] + 16.0, top, width)
 
 
 def draw_legend(page: Drawing, entries: Sequence[Entry], left: float, top: float, width: float) -> None:

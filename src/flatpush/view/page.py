@@ -12,6 +12,10 @@ from ..geometry import transform
 from ..geometry.pose import Array
 from ..problem import Plan, PushSegment, Rollout, Scene
 from . import palette
+from .drawing import Box, Drawing
+from .labels import Labels, beside
+from .panel import Panel
+from .table import MM, view_box, what_is_drawn
 from .timeline import Timeline, arc_starts
 from .trace import (
     PushTrace,
@@ -24,13 +28,13 @@ from .trace import (
 )
 from .words import plan_subtitle, plan_title, push_label
 
-MM = 1e3
+MIDDLE = 620.0  # width of the table between those of a telephone and of a screen [px]
 
 
 def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
     """The page: the plan's traces, object and fingers in motion, play, pause, scrub, speed, keyboard."""
     traces = trace_pushes(plan)
-    box = _view_box(plan, traces, rollouts)
+    box = view_box(plan, traces, rollouts)
     data = _data(plan, traces)
     # "<" must not stand in a script, whatever a name in the scene contains.
     script_data = json.dumps(data, separators=(",", ":"), ensure_ascii=True).replace("<", "\\u003c")
@@ -46,12 +50,6 @@ def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
         legend=_legend(plan, traces, bool(rollouts)),
         data=script_data,
     )
-
-
-def _view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollout]) -> tuple[float, ...]:
-    from .table import view_box
-
-    return tuple(float(v) for v in view_box(plan, traces, rollouts))
 
 
 def _data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
@@ -89,9 +87,7 @@ def _push(trace: PushTrace, start: float) -> dict[str, object]:
     }
 
 
-def _still(
-    plan: Plan, traces: tuple[PushTrace, ...], rollouts: Sequence[Rollout], box: tuple[float, ...]
-) -> str:
+def _still(plan: Plan, traces: tuple[PushTrace, ...], rollouts: Sequence[Rollout], box: Box) -> str:
     """All that does not move, back to front."""
     scene = plan.scene
     parts = [_grid(box)]
@@ -115,6 +111,15 @@ def _still(
         if trace.flat_path is not None:
             parts.append(f'<path class="flat" d="{_path(trace.flat_path)}"/>')
         parts.append("</g>")
+    for trace in traces if len(traces) > 1 else ():
+        path = trace.flat_path
+        path = transform(trace.segment.object, scene.object.cof) if path is None else path
+        points = json.dumps(_round(MM * path[:: max(1, len(path) // 60)], 2))
+        parts.append(
+            f'<g class="number" style="--c:{palette.push_colour(trace.number)}" data-path="{points}">'
+            f'<circle r="1"/><text dy="0.36em">{trace.number + 1}</text></g>'
+        )
+    panel, labels = _labels(plan, traces, box)
     for name, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
         corners = _outline(scene, pose)
         mark = transform(pose, orientation_mark(scene))
@@ -122,8 +127,7 @@ def _still(
             f'<g class="end {name}"><path d="{_path(corners, closed=True)}"/><path d="{_path(mark)}"/>'
         )
         if name == "goal" or not np.allclose(scene.start_pose, scene.goal_pose):
-            top = corners[np.argmax(corners[:, 1])] * MM
-            parts.append(f'<text x="{top[0]:.2f}" y="{-top[1]:.2f}" dy="-0.5em">{name}</text>')
+            parts.append(_name(panel, labels, corners, name))
         parts.append("</g>")
     for rollout in rollouts:
         paths = [_path(path) for path in rollout_paths(rollout, plan, traces)]
@@ -132,18 +136,47 @@ def _still(
     return "\n".join(parts)
 
 
-def _grid(box: tuple[float, ...]) -> str:
-    """Grid lines at round millimetres, with their numbers along the lower and the left border."""
+def _labels(plan: Plan, traces: Sequence[PushTrace], box: Box) -> tuple[Panel, Labels]:
+    """Where names have room on a page of a middle size; the numbers of the grid are there already."""
+    width, height = MIDDLE, MIDDLE * (box[3] - box[1]) / (box[2] - box[0])
+    panel = Panel(Drawing(width, height, ""), (0.0, 0.0, width, height), box)
+    labels = Labels(panel, what_is_drawn(plan, traces))
+    for y in _grid_values(box, 1):
+        place = float(panel.at(np.array([0.0, y]))[1])
+        labels.boxes.append((0.0, place - 8, 44.0, place + 8))
+    labels.boxes.append((0.0, height - 18, width, height))
+    return panel, labels
+
+
+def _name(panel: Panel, labels: Labels, corners: Array, name: str) -> str:
+    """A name beside an outline: it keeps its distance on the screen from a point of it, however large the page is."""
+    size = 40.0, 14.0
+    middle = labels.place(*size, beside(panel, MM * corners, *size))
+    near = corners[np.argmin(np.linalg.norm(panel.at(MM * corners) - middle, axis=1))]
+    dx, dy = middle - panel.at(MM * near)
+    return (
+        f'<text x="{MM * near[0]:.2f}" y="{-MM * near[1]:.2f}" dy="0.36em" style="transform: translate('
+        f'calc({dx:.1f} * var(--u)), calc({dy:.1f} * var(--u)))">{name}</text>'
+    )
+
+
+def _grid_values(box: Box, axis: int) -> Array:
+    """Round values along an axis of the box [mm]; those at its edges have no room for their numbers."""
     extent = max(box[2] - box[0], box[3] - box[1])
     step = next(s for e in range(-3, 9) for s in (10.0**e, 2 * 10.0**e, 5 * 10.0**e) if extent / s <= 9)
+    low, high = box[axis] + 0.05 * extent, box[axis + 2] - 0.02 * extent
+    return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
+
+
+def _grid(box: Box) -> str:
+    """Grid lines at round millimetres, with their numbers along the lower and the left border."""
     parts = ['<g class="grid">']
-    for x in np.arange(np.ceil(box[0] / step), np.floor(box[2] / step) + 1) * step:
+    for x in _grid_values(box, 0):
         parts.append(f'<path d="M{x:.3f} {-box[1]:.2f}V{-box[3]:.2f}"/>')
         parts.append(f'<text class="x" x="{x:.3f}" y="{-box[1]:.2f}">{_number(x)}</text>')
-    for y in np.arange(np.ceil(box[1] / step), np.floor(box[3] / step) + 1) * step:
+    for y in _grid_values(box, 1):
         parts.append(f'<path d="M{box[0]:.2f} {-y:.3f}H{box[2]:.2f}"/>')
-        if y > box[1] + 0.05 * extent:  # lower down are the numbers of x
-            parts.append(f'<text class="y" x="{box[0]:.2f}" y="{-y:.3f}">{_number(y)}</text>')
+        parts.append(f'<text class="y" x="{box[0]:.2f}" y="{-y:.3f}">{_number(y)}</text>')
     parts.append(f'<text class="x unit" x="{box[2]:.2f}" y="{-box[1]:.2f}">mm</text></g>')
     return "".join(parts)
 

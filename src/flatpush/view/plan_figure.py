@@ -12,18 +12,18 @@ from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Box, Drawing, Look
 from .labels import Labels, along
-from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
-from .panel import BOTTOM, LEFT, Panel, frame_for
+from .legend import EDGE, Entry, draw_legend, draw_title, frame_and_legend, legend_height, title_height
+from .panel import BOTTOM, Panel
 from .table import (
-    BOUNDS,
     MM,
-    OBSTACLE,
     draw_endpoints,
     draw_fingers,
+    draw_number,
     draw_object,
     draw_workspace,
     view_box,
     what_is_drawn,
+    workspace_entries,
 )
 from .trace import PushTrace, fingertips, rollout_paths, trace_pushes
 
@@ -45,20 +45,18 @@ def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | No
     traces = trace_pushes(plan)
     title, subtitle = words.plan_title(plan), words.plan_subtitle(plan)
     box = view_box(plan, traces, rollouts)
-    entries = _legend(plan, traces, bool(rollouts), tree)
-    top, full = title_height(title, subtitle), PAGE - LEFT - 2 * EDGE
-    frame = frame_for(box, EDGE + LEFT, top, full, 110.0, 330.0)
-    width = PAGE - 2 * EDGE
-    # A picture that is too high to be as wide as the page has its legend at its right instead of an empty margin.
-    beside = bool(entries) and frame[2] - frame[0] < 0.9 * full
-    if beside:
-        width = max(entry.width for entry in entries)
-        frame = frame_for(box, EDGE + LEFT, top, full - width - 16.0, 110.0, 380.0)
-    below = frame[3] + BOTTOM + 4
-    strip = below if beside else below + legend_height(entries, width) + 6
-    page = Drawing(PAGE, strip + _strip_height(len(traces)) + EDGE, title)
+    entries = _legend(plan, traces, box, bool(rollouts), tree)
+    frame, legend = frame_and_legend(box, entries, title_height(title, subtitle))
+    # The strip stands under the legend where both find room beside the axes, else under all of it.
+    cells, last = min(len(traces), MOST_CELLS), legend[1] + legend_height(entries, legend[2])
+    columns = -(-cells // -(-cells // MOST_COLUMNS)) if cells else 0
+    strip, wide = (EDGE, max(frame[3] + BOTTOM, last) + 6), PAGE - 2 * EDGE
+    if legend[0] > EDGE and last + 12 + _strip_height(cells, 1) <= frame[3] + BOTTOM:
+        strip, wide, columns = (legend[0], last + 12), legend[2], min(cells, 1)
+    bottom = max(frame[3] + BOTTOM, last, strip[1] + _strip_height(cells, columns))
+    page = Drawing(PAGE, bottom + EDGE, title)
     draw_title(page, title, subtitle)
-    draw_legend(page, entries, *((frame[2] + 16.0, frame[1]) if beside else (EDGE, below)), width)
+    draw_legend(page, entries, *legend)
     panel = Panel(page, frame, box)
     panel.axes()
     if explored is not None and tree:
@@ -74,7 +72,9 @@ def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | No
         _draw_cones(panel, plan.scene, trace)
     for rollout in rollouts:
         _draw_rollout(panel, plan, rollout, traces, faint=len(rollouts) > 3)
-    _draw_strip(page, plan.scene, plan.pushes, strip)
+    _draw_strip(
+        page, plan.scene, plan.pushes, *strip, wide / max(columns, 3 if wide > PAGE / 2 else 1), columns
+    )
     return page
 
 
@@ -91,7 +91,8 @@ def _draw_push(panel: Panel, plan: Plan, trace: PushTrace, labels: Labels) -> No
         draw_fingers(panel, scene, fingertips(pusher, trace.segment.fingers), 0.95 if endpoint else 0.35)
     panel.line(MM * trace.segment.pusher[:, :2], Look(palette.PUSHER, 0.6, opacity=0.55), 4)
     for centre, sense in trace.centres:
-        panel.sign(MM * centre, sense > 0, colour)
+        if panel.holds(MM * centre):
+            panel.sign(MM * centre, sense > 0, colour)
     first = (
         trace.flat_path if trace.flat_path is not None else transform(trace.segment.object, scene.object.cof)
     )
@@ -108,19 +109,7 @@ def _draw_push(panel: Panel, plan: Plan, trace: PushTrace, labels: Labels) -> No
             panel.arrow(path[moving[-1]], path[-1], colour, 1.9, 7.1)
         panel.disc(path[0], 2.4, Look("#ffffff", 0.7, fill=colour), 7.2)
     if len(plan.pushes) > 1:
-        _draw_number(panel.page, labels.place(13.0, 13.0, along(panel, MM * first), free=True), trace.number)
-
-
-def _draw_number(page: Drawing, place: Array, number: int) -> None:
-    """The number of a push on a disc in its colour."""
-    page.add(d.Disc(place, 6.2, Look("#ffffff", 0.8, fill=palette.push_colour(number))), 9)
-    size = 7.5 if number < 99 else 6.0
-    page.add(
-        d.Text(
-            float(place[0]), float(place[1]) + 0.36 * size, str(number + 1), size, "#ffffff", "middle", True
-        ),
-        9.1,
-    )
+        draw_number(panel.page, labels.place(13.0, 13.0, along(panel, MM * first), free=True), trace.number)
 
 
 def _draw_transits(panel: Panel, plan: Plan) -> None:
@@ -159,7 +148,8 @@ def cone_length(scene: Scene, contact: Array, angles: Sequence[float]) -> float:
     """How long a cone at a contact is drawn [m]: 0.4 of the object's size, and it does not leave the object.
 
     Args:
-        contact: on the outline, in O. angles: of the cones' edges in O [rad]; those that leave at once do not count.
+        contact: on the outline or, as the middle of two, near it, in O.
+        angles: of the cones' edges in O [rad]; those that leave at once do not count.
     """
     corners = scene.object.outline.polyline()
     size = scene.object.outline.size
@@ -172,8 +162,9 @@ def cone_length(scene: Scene, contact: Array, angles: Sequence[float]) -> float:
             away = corners - contact
             reach = (away[:, 0] * step[:, 1] - away[:, 1] * step[:, 0]) / across
             share = (away[:, 0] * ray[1] - away[:, 1] * ray[0]) / across
-        hits = reach[(share >= -1e-9) & (share <= 1 + 1e-9) & (reach > 0.02 * size)]
-        length = min([length, *hits.tolist()])
+        hits = np.sort(reach[(share >= -1e-9) & (share <= 1 + 1e-9) & (reach > 0.02 * size)])
+        # From the middle of two contacts in a notch a ray first enters the object, and leaves it later.
+        length = min([length, *hits[1 - len(hits) % 2 :].tolist()])
     return length
 
 
@@ -186,29 +177,29 @@ def _draw_rollout(
     draw_object(panel, plan.scene, rollout.final_pose, look, 8)
 
 
-def _strip_height(pushes: int) -> float:
-    return CELL_HEIGHT * _strip_shape(pushes)[1] + 14.0 if pushes else 0.0
+def _strip_height(cells: int, columns: int) -> float:
+    return CELL_HEIGHT * -(-cells // columns) + 14.0 if cells else 0.0
 
 
-def _strip_shape(pushes: int) -> tuple[int, int]:
-    """Columns and rows of the strip: at most nine columns, rows of about the same length."""
-    shown = min(pushes, MOST_CELLS)
-    rows = -(-shown // MOST_COLUMNS)
-    return -(-shown // rows), rows
-
-
-def _draw_strip(page: Drawing, scene: Scene, pushes: Sequence[PushSegment], top: float) -> None:
+def _draw_strip(
+    page: Drawing,
+    scene: Scene,
+    pushes: Sequence[PushSegment],
+    left: float,
+    top: float,
+    cell: float,
+    columns: int,
+) -> None:
     """The pushes in order, as an operator sets them up: the object as it was drawn, the fingers where they land."""
     if not pushes:
         return
-    columns, _ = _strip_shape(len(pushes))
-    cell = (PAGE - 2 * EDGE) / max(columns, 3)
     more = f"; the first {MOST_CELLS} of {len(pushes)}" if len(pushes) > MOST_CELLS else ""
-    page.add(d.Text(EDGE, top + 9, f"{words.STRIP}{more}", 8.0, SOFT, bold=True), 20)
+    head = d.shortened(f"{words.STRIP}{more}", 8.0, PAGE - EDGE - left, bold=True)
+    page.add(d.Text(left, top + 9, head, 8.0, SOFT, bold=True), 20)
     for number, push in enumerate(pushes[:MOST_CELLS]):
         row, column = divmod(number, columns)
-        left, high = EDGE + cell * column, top + 14 + CELL_HEIGHT * row
-        _draw_cell(page, scene, push, number, (left, high, left + cell - 6, high + CELL_HEIGHT))
+        x, y = left + cell * column, top + 14 + CELL_HEIGHT * row
+        _draw_cell(page, scene, push, number, (x, y, x + cell - 6, y + CELL_HEIGHT))
 
 
 def _draw_cell(page: Drawing, scene: Scene, push: PushSegment, number: int, cell: Box) -> None:
@@ -226,13 +217,14 @@ def _draw_cell(page: Drawing, scene: Scene, push: PushSegment, number: int, cell
     draw_fingers(panel, scene, landing)
     panel.arrow(MM * tail, MM * head, palette.PUSHER, 1.0)
     x, y = cell[0] + 6.5, picture[3] + 8.0
-    _draw_number(page, np.array([x, y]), number)
+    draw_number(page, np.array([x, y]), number)
     room = cell[2] - x - 9
     page.add(d.Text(x + 9, y + 2.5, d.shortened(push.push, 7.5, room), 7.5, d.INK), 20)
     page.add(d.Text(x + 9, y + 11.5, d.shortened(push.word, 7.0, room), 7.0, SOFT), 20)
 
 
-def _legend(plan: Plan, traces: Sequence[PushTrace], simulated: bool, tree: bool) -> list[Entry]:
+def _legend(plan: Plan, traces: Sequence[PushTrace], box: Box, simulated: bool, tree: bool) -> list[Entry]:
+    low, high = np.reshape(box, (2, 2))
     several = len(traces) > 1
     entries: list[Entry] = []
     if any(t.flat_path is not None for t in traces):
@@ -242,7 +234,7 @@ def _legend(plan: Plan, traces: Sequence[PushTrace], simulated: bool, tree: bool
         entries.append(Entry(words.FINGERS, Look(palette.PUSHER, 0.9), "line and dot"))
     if any(isinstance(s, TransitSegment) for s in plan.segments):
         entries.append(Entry(words.ALONE, Look(palette.PUSHER, 0.9, ALONE)))
-    if any(t.centres for t in traces):
+    if any(np.all((low <= MM * c) & (MM * c <= high)) for t in traces for c, _ in t.centres):
         entries.append(Entry(words.CENTRE, Look(SOFT, fill="#ffffff"), "dot", signs=True))
     if traces and traces[0].contact is not None:
         entries.append(
@@ -251,10 +243,7 @@ def _legend(plan: Plan, traces: Sequence[PushTrace], simulated: bool, tree: bool
         if traces[0].motion is not None:
             look = Look(palette.MOTION, fill=palette.MOTION, fill_opacity=0.22)
             entries.append(Entry(words.MOTION_CONE, look, "box"))
-    if plan.scene.workspace.bounds is not None:
-        entries.append(Entry(words.BOUNDS, BOUNDS))
-    if plan.scene.workspace.obstacles:
-        entries.append(Entry(words.OBSTACLE, OBSTACLE, "box"))
+    entries += workspace_entries(plan.scene)
     if tree:
         entries.append(Entry(words.TREE, Look(palette.TREE, 0.8)))
     if simulated:

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..documents.atomic import write_atomically
+from ..documents.outline_reader import OutlineNote
+from ..documents.shapes import DrawnOutline
 from ..errors import InputError
 from ..geometry import cross, perpendicular
 from ..geometry.pose import Array
@@ -14,7 +16,7 @@ from . import drawing as d
 from . import palette, words
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .figure import check_ending
-from .labels import Labels
+from .labels import Labels, dense
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
 from .plan_figure import cone_length
@@ -30,13 +32,16 @@ DRIVE_ARM = Look(palette.DRIVE, 0.9, (3.0, 2.0))
 SIGN, DOT = 5.2, 3.4  # radius of a turning centre and of the flat point [pt]
 
 
-def describe_figure(scene: Scene, descriptions: Sequence[PushSketch], path: str | Path) -> None:
+def describe_figure(
+    scene: Scene, descriptions: Sequence[PushSketch], path: str | Path, note: OutlineNote | None = None
+) -> None:
     """Draws the pushes of a scene into a file, one row each, whole or not at all.
 
     Args:
         scene: whose object is drawn.
         descriptions: the pushes.
         path: ends in .svg or .png.
+        note: of what the outline was made; a drawing is shown above the pushes.
 
     Raises:
         InputError: if the ending is another, the file cannot be written, or there is nothing to draw.
@@ -44,10 +49,10 @@ def describe_figure(scene: Scene, descriptions: Sequence[PushSketch], path: str 
     ending = check_ending(path, (".svg", ".png"))
     if not descriptions:
         raise InputError("there is at least one push to describe", source=str(path))
-    write_atomically(path, draw_sketches(scene, descriptions).encode(ending))
+    write_atomically(path, draw_sketches(scene, descriptions, note).encode(ending))
 
 
-def draw_sketches(scene: Scene, sketches: Sequence[PushSketch]) -> Drawing:
+def draw_sketches(scene: Scene, sketches: Sequence[PushSketch], note: OutlineNote | None = None) -> Drawing:
     """The same as a drawing."""
     title = f"{scene.object.name}: where it can be pushed, and how it turns"
     subtitle = (
@@ -55,11 +60,24 @@ def draw_sketches(scene: Scene, sketches: Sequence[PushSketch]) -> Drawing:
     )
     entries = _legend(scene, sketches)
     top, width = title_height(title, subtitle), PAGE - 2 * EDGE
+    head = top
+    if note is not None and note.drawing is not None:
+        top += CAPTION + ROW + BOTTOM
     below = top + len(sketches) * (CAPTION + ROW + BOTTOM) + 4
     page = Drawing(PAGE, below + legend_height(entries, width) + EDGE, title)
     draw_title(page, title, subtitle)
     draw_legend(page, entries, EDGE, below, width)
     left, middle = EDGE + LEFT, EDGE + LEFT + 0.4 * width
+    if note is not None and note.drawing is not None:
+        high = head + CAPTION
+        page.add(d.Text(left, high - 8, "the drawing", 9.5, INK, bold=True), 20)
+        draw_source(page, note.drawing, (left, high, middle - 12, high + ROW))
+        y = high + 8
+        for told in note.lines:
+            for line in d.wrapped(told, 8.0, PAGE - EDGE - middle - LEFT, most=6):
+                page.add(d.Text(middle + LEFT, y, line, 8.0, SOFT), 20)
+                y += 11
+            y += 4
     for row, sketch in enumerate(sketches):
         high = top + row * (CAPTION + ROW + BOTTOM) + CAPTION
         close = Panel(page, (left, high, middle - 12, high + ROW), _contact_box(scene, sketch))
@@ -80,6 +98,30 @@ def draw_sketches(scene: Scene, sketches: Sequence[PushSketch]) -> Drawing:
             lines = d.wrapped(f"This push cannot steer: {sketch.refusal}", 8.0, frame[2] - frame[0], most=12)
             _write(page, lines, frame[0], high + 12 * len(lines), palette.MOTION)
     return page
+
+
+def draw_source(page: Drawing, drawn: DrawnOutline, frame: Box) -> None:
+    """What was drawn, in O: the outline that was taken in black, what was left out in grey, and the axes of O."""
+    outline = drawn.outline.polyline()
+    size = drawn.outline.size
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    parts = [part.points for part in drawn.left_out if len(part.points) > 1]
+    # A sheet much larger than the object is not shown whole.
+    for points in parts:
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    low, high = np.maximum(low, outline.min(axis=0) - size), np.minimum(high, outline.max(axis=0) + size)
+    panel = Panel(page, frame, _box([np.stack([low, high])], 0.08 * size))
+    panel.axes()
+    panel.area(MM * outline, BODY, 2)
+    for points in parts:
+        panel.line(MM * points, Look("#9a9a9a", 0.8), 3)
+    ring = MM * np.concatenate([outline, outline[:1]])
+    labels = Labels(panel, dense(ring, panel.unit(3.0)))
+    for name, axis in (("x of O", (0.3, 0.0)), ("y of O", (0.0, 0.3))):
+        head = size * np.array(axis)
+        panel.arrow(np.zeros(2), MM * head, INK, 0.9, 6.5)
+        if panel.holds(MM * head):
+            _name(panel, labels, MM * head, head, name, INK)
 
 
 def caption(sketch: PushSketch) -> str:
@@ -111,6 +153,7 @@ def _draw_contact(panel: Panel, scene: Scene, sketch: PushSketch) -> None:
     angles = [float(np.arctan2(e[1], e[0])) for left, right, *_ in cones for e in (left, right)]
     length = MM * cone_length(scene, sketch.contact, [a for a in angles if np.isfinite(a)])
     tip = MM * sketch.contact
+    edges = []
     for left, right, colour, share in cones:
         if not np.all(np.isfinite([left, right])):
             continue
@@ -120,14 +163,19 @@ def _draw_contact(panel: Panel, scene: Scene, sketch: PushSketch) -> None:
         panel.area(np.concatenate([tip[None], edge]), Look(fill=colour, fill_opacity=0.12), 5)
         for end in edge[[0, -1]]:
             panel.arrow(tip, end, colour, 1.1, 6)
+            edges.append(np.stack([tip, end]))
     panel.line(np.stack([tip, MM * sketch.cof]), LEVER, 6)
     frame = _push_frame(scene, sketch)
-    arms = [np.linspace(sketch.cof, head, 12) for _, head in frame]
-    symbols = np.stack([sketch.cof, sketch.contact, sketch.flat_point, sketch.drive_centre])
-    labels = Labels(panel, MM * np.concatenate([symbols, *arms]))
-    if np.all(np.isfinite(sketch.drive)):
-        along = sketch.drive / np.linalg.norm(sketch.drive)
-        head = tip + 1.35 * length * along
+    lines = [MM * np.stack([sketch.cof, head]) for _, head in frame] + edges
+    outline = MM * scene.object.outline.polyline()
+    lines.append(np.concatenate([outline, outline[:1]]))
+    along = sketch.drive / np.linalg.norm(sketch.drive)
+    head = tip + 1.35 * length * along
+    if np.all(np.isfinite(head)):
+        lines.append(np.stack([tip, head]))
+    symbols = MM * np.stack([sketch.cof, sketch.contact, sketch.flat_point, sketch.drive_centre])
+    labels = Labels(panel, np.concatenate([symbols, *(dense(line, panel.unit(3.0)) for line in lines)]))
+    if np.all(np.isfinite(head)):
         panel.arrow(tip, head, palette.DRIVE, 1.5, 6.4)
         _name(panel, labels, head, along, "u", palette.DRIVE)
         _drive_centre(panel, sketch)

@@ -15,7 +15,7 @@ from .drawing import PAGE, SOFT, Drawing, Look
 from .figure import check_figure_at
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
-from .table import MM, draw_fingers, draw_object, draw_workspace, view_box
+from .table import MM, draw_fingers, draw_object, draw_workspace, view_box, workspace_entries
 from .timeline import Timeline, doing
 from .trace import fingers_at, fingertips, trace_pushes
 
@@ -68,6 +68,8 @@ def draw_snapshots(plan: Plan, count: int = 8) -> Drawing:
         Entry(words.START, Look(palette.START, 0.8, (2.0, 1.5)), "box"),
         Entry(words.GOAL, Look(palette.GOAL, 0.8, (2.0, 1.5)), "box"),
         Entry(words.WAY, Look(palette.push_colour(0) if len(plan.pushes) == 1 else SOFT, 1.4)),
+        *([Entry(words.FINGERS_ALONE, Look(palette.PUSHER, 1.0), "line and dot")] if timeline.moves else []),
+        *workspace_entries(plan.scene),
     ]
     page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
     draw_title(page, title, subtitle)

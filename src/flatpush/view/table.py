@@ -9,12 +9,14 @@ from ..geometry.pose import Array
 from ..problem import Plan, Rollout, Scene
 from . import drawing as d
 from . import palette, words
-from .drawing import Box, Look
+from .drawing import Box, Drawing, Look
 from .labels import Labels, beside, dense
+from .legend import Entry
 from .panel import Panel
 from .trace import PushTrace, fingertips, orientation_mark
 
 MM = 1e3
+LABEL_STEPS = 200  # of what is drawn, from side to side: no label slips between two points of a line
 
 
 def view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollout] = ()) -> Box:
@@ -46,10 +48,15 @@ def outline_at(scene: Scene, pose: Array) -> Array:
 def draw_workspace(panel: Panel, scene: Scene) -> None:
     """Bounds and obstacles."""
     if scene.workspace.bounds is not None:
-        x0, y0, x1, y1 = MM * np.asarray(scene.workspace.bounds)
-        panel.area(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), BOUNDS, 1)
+        panel.area(MM * corners_of(scene.workspace.bounds), BOUNDS, 1)
     for obstacle in scene.workspace.obstacles:
         panel.area(MM * obstacle.polyline(), OBSTACLE, 1)
+
+
+def workspace_entries(scene: Scene) -> list[Entry]:
+    """What the legend says of bounds and obstacles."""
+    entries = [] if scene.workspace.bounds is None else [Entry(words.BOUNDS, BOUNDS)]
+    return entries + ([Entry(words.OBSTACLE, OBSTACLE, "box")] if scene.workspace.obstacles else [])
 
 
 BOUNDS = Look(palette.BOUNDS, 1.4)
@@ -92,14 +99,40 @@ def draw_endpoints(panel: Panel, plan: Plan, labels: Labels | None = None) -> No
             )
 
 
+def draw_number(page: Drawing, place: Array, number: int) -> None:
+    """The number of a push on a disc in its colour."""
+    page.add(d.Disc(place, 6.2, Look("#ffffff", 0.8, fill=palette.push_colour(number))), 9)
+    size = 7.5 if number < 99 else 6.0
+    page.add(
+        d.Text(
+            float(place[0]), float(place[1]) + 0.36 * size, str(number + 1), size, "#ffffff", "middle", True
+        ),
+        9.1,
+    )
+
+
 def what_is_drawn(plan: Plan, traces: Iterable[PushTrace]) -> Array:
     """Points of all lines of a plan [mm], shape (n, 2), for labels to keep off."""
     scene = plan.scene
-    found = [dense(outline_at(scene, pose)) for pose in (scene.start_pose, scene.goal_pose)]
+    poses = [scene.start_pose, scene.goal_pose, *(pose for trace in traces for pose in trace.marks)]
+    lines = [_closed(outline_at(scene, pose)) for pose in poses]
+    lines += [trace.flat_path for trace in traces if trace.flat_path is not None]
+    lines += [_closed(obstacle.polyline()) for obstacle in scene.workspace.obstacles]
+    if scene.workspace.bounds is not None:
+        lines.append(_closed(corners_of(scene.workspace.bounds)))
+    step = float(np.max(np.ptp(np.concatenate(lines), axis=0))) / LABEL_STEPS
+    found = [dense(line, step) for line in lines]
     for trace in traces:
-        found += [dense(outline_at(scene, pose)) for pose in trace.marks]
         found.append(fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2))
-        found += [] if trace.flat_path is None else [trace.flat_path]
         found += [centre[None] for centre, _ in trace.centres]
-    found += [dense(obstacle.polyline()) for obstacle in scene.workspace.obstacles]
     return MM * np.concatenate(found)
+
+
+def corners_of(box: Sequence[float]) -> Array:
+    """The corners (4, 2) of a box xmin, ymin, xmax, ymax."""
+    x0, y0, x1, y1 = box
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+
+def _closed(corners: Array) -> Array:
+    return np.concatenate([corners, corners[:1]])

@@ -1,5 +1,6 @@
 """The picture of a closed loop: where the object should go and went; over time its error, contact and controller."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,15 +18,16 @@ from .figure import check_ending
 from .labels import Labels
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import AXIS, BOTTOM, LEFT, Panel, number, ticks
-from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn
+from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn, workspace_entries
 from .trace import trace_pushes
 
 ENDINGS = (".svg", ".png")
 STRIP = 11.0  # height of a strip over time [pt]
+LEAST_SEEN = 1 / 800  # part of the time that is a quarter of a point in a strip
 MOST_SAMPLES = 400  # of the clearance
 REFERENCE, ACTUAL = Look("#b3b3b3", 3.0), Look(palette.SIMULATED, 1.2)
 TOLERANCE = Look(palette.GOAL, 1.0, (3.0, 2.0))
-CLEARANCE = Look(palette.OBSTACLE, 1.0, (1.5, 1.5))
+CLEARANCE = Look(palette.OBSTACLE, 1.1, (2.0, 1.5))
 CONTACTS = {
     "sticking": (words.STICKS, palette.PUSHES[0]),
     "sliding_left": (words.SLIDES_LEFT, "#f0b429"),
@@ -34,9 +36,9 @@ CONTACTS = {
     "rest": (words.RESTS, "#9a9a9a"),
 }
 MODES = {
-    "path": "#4477aa", "tracking": "#4477aa", "posture": "#66ccee", "push": "#4477aa", "look": "#c9c9c9",
-    "resume": "#228833", "retreat": "#e6a100", "saturated": "#cc3311", "guarded": "#ee7733", "waiting": "#777777",
-    "held": "#111111", "transit": "#aa3377", "done": "#0061b5",
+    "path": "#4477aa", "tracking": "#4477aa", "posture": "#66ccee", "push": "#4477aa", "look": "#d9cf8a",
+    "looking": "#d9cf8a", "resume": "#228833", "retreat": "#e6a100", "saturated": "#cc3311", "guarded": "#ee7733",
+    "waiting": "#777777", "held": "#111111", "transit": "#aa3377", "done": "#002f5c",
 }  # fmt: skip
 
 
@@ -136,29 +138,25 @@ def clearances(scene: Scene, poses: Array) -> Array:
 
 
 def _error(page: Drawing, frame: Box, plan: Plan, run: ClosedLoopRun) -> None:
-    """The distance over time with the tolerance, and the clearance where there is something to clear."""
+    """The distance over time with the tolerance; below it the clearance where there is something to clear."""
     near = MM * distances(plan, run)
-    tolerance = MM * float(np.hypot(*plan.scene.planning.goal_tolerance[:2]))
+    # Within this distance x and y are both within their tolerances.
+    tolerance = MM * float(min(plan.scene.planning.goal_tolerance[:2]))
     span = (float(run.times[0]), max(float(run.times[-1]), float(run.times[0]) + 1e-6))
+    left, top, right, bottom = frame
+    foot = bottom - (0.4 * (bottom - top) if _has_clearance(plan.scene) else 0.0)
     most = 1.08 * max(float(near.max()), 1.3 * tolerance)
-    panel = Panel(page, frame, (span[0], 0.0, span[1], most), equal=False)
+    panel = Panel(page, (left, top, right, foot), (span[0], 0.0, span[1], most), equal=False)
     panel.axes("", f"off the {'goal' if _plans_anew(run) else 'reference'} [mm]", (False, True))
     if _has_clearance(plan.scene):
         some = np.unique(np.linspace(0, len(run.times) - 1, MOST_SAMPLES).astype(int))
         gap = MM * clearances(plan.scene, run.object[some])
-        panel.line(np.stack([run.times[some], np.clip(gap, 0.0, most)], axis=1), CLEARANCE, 3)
-        page.add(
-            d.Text(
-                frame[2],
-                frame[1] + 8,
-                f"least clearance {gap.min():.1f} mm",
-                7.5,
-                palette.OBSTACLE,
-                "end",
-                halo=True,
-            ),
-            20,
-        )
+        low, high = min(float(gap.min()), 0.0), 1.08 * max(float(gap.max()), 1.0)
+        below = Panel(page, (left, foot + 20, right, bottom), (span[0], low, span[1], high), equal=False)
+        below.axes("", "clearance [mm]", (False, True))
+        below.line(np.stack([run.times[some], gap], axis=1), CLEARANCE, 3)
+        least = f"least clearance {gap.min():.1f} mm"
+        page.add(d.Text(right, foot + 16, least, 7.5, palette.OBSTACLE, "end", halo=True), 20)
     panel.line(np.array([[span[0], tolerance], [span[1], tolerance]]), TOLERANCE, 4)
     panel.line(np.stack([run.times, near], axis=1), ACTUAL, 5)
 
@@ -196,14 +194,22 @@ def _legend(scene: Scene, run: ClosedLoopRun) -> list[Entry]:
         Entry("actual, centre of friction", ACTUAL),
         Entry("goal tolerance", TOLERANCE),
     ]
-    return entries + ([Entry("clearance", CLEARANCE)] if _has_clearance(scene) else [])
+    if _has_clearance(scene):
+        entries.append(Entry("clearance of the object", CLEARANCE))
+    return entries + workspace_entries(scene)
 
 
 def _strip_entries(run: ClosedLoopRun) -> tuple[list[Entry], list[Entry]]:
-    """What the colours of the two strips mean, only those that occur."""
-    contacts = [Entry(CONTACTS[c][0], Look(fill=CONTACTS[c][1]), "box") for c in dict.fromkeys(run.contacts)]
-    modes = [Entry(m, Look(fill=_colour(m, run)), "box") for m in dict.fromkeys(run.modes)]
+    """What the colours of the two strips mean, only those that can be seen."""
+    contacts = [Entry(CONTACTS[c][0], Look(fill=CONTACTS[c][1]), "box") for c in _seen(run.contacts)]
+    modes = [Entry(m, Look(fill=_colour(m, run)), "box") for m in _seen(run.modes)]
     return contacts, modes
+
+
+def _seen(values: Sequence[str]) -> list[str]:
+    """Those that hold long enough, in the order in which they begin."""
+    least = LEAST_SEEN * len(values)
+    return [value for value, count in Counter(values).items() if count >= least]
 
 
 def _colour(mode: str, run: ClosedLoopRun) -> str:

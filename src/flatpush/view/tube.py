@@ -10,13 +10,22 @@ from ..geometry import transform
 from ..geometry.pose import Array
 from ..simulation.study import Runs
 from . import drawing as d
-from . import palette, words
+from . import palette
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .figure import check_ending
 from .labels import Labels
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
-from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn
+from .table import (
+    MM,
+    draw_endpoints,
+    draw_object,
+    draw_workspace,
+    outline_at,
+    view_box,
+    what_is_drawn,
+    workspace_entries,
+)
 from .trace import trace_pushes
 
 ENDINGS = (".svg", ".png")
@@ -27,6 +36,7 @@ ACROSS = 62.0  # height of the panel that shows how wide the tube is [pt]
 TOLERANCE = Look(palette.GOAL, 1.0, (3.0, 2.0))
 STUCK, SLIPPED = palette.PUSHES[0], palette.SIMULATED
 FAR_OFF = 4.0  # times the width of 95 % of the ends; a picture of all of them would show only the few
+THIN = 0.02  # width over length below which ends lie on a line, not in an ellipse
 CHI_SQUARE = 5.991  # of two degrees of freedom at 95 %
 
 
@@ -72,7 +82,9 @@ def draw_tube(runs: Runs) -> Drawing:
     table = Panel(page, (left, top, left + wide, top + height), box)
     table.axes()
     draw_workspace(table, plan.scene)
-    draw_endpoints(table, plan, Labels(table, what_is_drawn(plan, traces)))
+    drawn = [what_is_drawn(plan, traces)]
+    drawn += [MM * outline_at(plan.scene, pose) for pose in runs.final[:MOST_DRAWN]]
+    draw_endpoints(table, plan, Labels(table, np.concatenate(drawn)))
     for pose in runs.final[:MOST_DRAWN]:
         draw_object(table, plan.scene, pose, Look(palette.SIMULATED, 0.35, opacity=0.22), 2)
     cof = plan.scene.object.cof
@@ -86,7 +98,7 @@ def draw_tube(runs: Runs) -> Drawing:
         table.line(middle, Look(palette.SIMULATED, 0.8), 7)
 
     ends = Panel(page, (right, top + 14, PAGE - EDGE, top + height), ends_box(runs))
-    ends.axes(y="")
+    ends.axes()
     page.add(d.Text(right, top + 7, "ends of the drawing's origin", 8.0, SOFT, bold=True), 20)
     _ends(ends, runs)
     _width(page, (left, across, PAGE - EDGE, across + ACROSS), tubes)
@@ -119,7 +131,8 @@ def tube_across(paths: Array) -> Tube | None:
 def ends_box(runs: Runs) -> Box:
     """What shows the ends, the goal and its tolerance [mm].
 
-    Every end, unless a few lie so far off that nothing could be told of the others: then 95 % of them in x and in y.
+    Every end, and their ellipse, unless a few lie so far off that nothing could be told of the others: then 95 % of
+    them in x and in y.
     """
     goal = MM * runs.plan.scene.goal_pose[:2]
     tolerance = MM * np.array(runs.plan.scene.planning.goal_tolerance[:2])
@@ -129,7 +142,8 @@ def ends_box(runs: Runs) -> Box:
         shown = np.concatenate([points, (goal - tolerance)[None], (goal + tolerance)[None]])
         return shown.min(axis=0), shown.max(axis=0)
 
-    low, high = around(ends)
+    half = MM * np.sqrt(CHI_SQUARE * np.diag(runs.covariance)[:2]) * has_ellipse(runs)
+    low, high = around(np.concatenate([ends, [MM * runs.mean[:2] - half, MM * runs.mean[:2] + half]]))
     nearer = around(np.quantile(ends, [0.025, 0.975], axis=0))
     if np.max(high - low) > FAR_OFF * np.max(nearer[1] - nearer[0]):
         low, high = nearer
@@ -161,7 +175,7 @@ def _width(page: Drawing, frame: Box, tubes: list[Tube]) -> None:
     )
     reach = 1.1 * max(most, 1e-3)
     panel = Panel(page, frame, (0.0, -reach, max(start, 1e-3), reach), equal=False)
-    panel.axes("way of the centre of friction [mm]", "aside [mm]")
+    panel.axes("path of the centre of friction [mm]", "aside [mm]")
     page.add(
         d.Text(frame[0], frame[1] - 5, "how wide the tube is (+ left of its middle)", 8.0, SOFT, bold=True),
         20,
@@ -176,7 +190,10 @@ def _width(page: Drawing, frame: Box, tubes: list[Tube]) -> None:
 
 def has_ellipse(runs: Runs) -> bool:
     """Whether the ends spread in two directions, so that an ellipse stands for them."""
-    return len(runs) > 2 and float(np.linalg.eigvalsh(runs.covariance[:2, :2])[0]) > 1e-14
+    if len(runs) < 3:
+        return False
+    less, more = np.linalg.eigvalsh(runs.covariance[:2, :2]).tolist()
+    return bool(less > max(1e-14, THIN**2 * more))
 
 
 def _ends(panel: Panel, runs: Runs) -> None:
@@ -227,9 +244,14 @@ def _table_box(runs: Runs, box: Box) -> Box:
 def _subtitle(runs: Runs) -> str:
     distance, turn = np.quantile(runs.errors, 0.5, axis=0)
     return (
-        f"off the goal in the median {MM * distance:.2f} mm and {np.degrees(turn):.2f}°;"
+        f"off the goal in the median {_small(MM * distance)} mm and {_small(np.degrees(turn))}°;"
         f" stayed sticking in {100 * runs.sticking_share:.1f} % of the runs"
     )
+
+
+def _small(value: float) -> str:
+    """With two digits; nothing that is there becomes 0."""
+    return f"{value:.2f}" if value >= 0.005 or value == 0 else "<0.01"
 
 
 def _legend(runs: Runs) -> list[Entry]:
@@ -247,5 +269,5 @@ def _legend(runs: Runs) -> list[Entry]:
     return [
         *entries,
         Entry("goal (×) and its tolerance", TOLERANCE),
-        Entry(words.GOAL, Look(palette.GOAL, 1.7)),
+        *workspace_entries(runs.plan.scene),
     ]

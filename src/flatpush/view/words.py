@@ -6,15 +6,15 @@ from ..problem import Plan, PushSegment
 
 START, GOAL, BOTH = "start", "goal", "start = goal"
 FLAT_PATH = "path of the flat point"
-WAY = "way of the centre of friction so far"
-FINGERS = "fingers and their path"
+WAY = "path of the centre of friction so far"
+FINGERS, FINGERS_ALONE = "fingers and their path", "fingers"
 ALONE = "pusher alone (dotted: lifted)"
 CENTRE = "turning centre (+ left, − right)"
 FRICTION_CONE, MOTION_CONE = "friction cone", "motion cone in use"
 CONTACT, CONTROLLER = "contact", "controller"
 STICKS, SLIDES_LEFT, SLIDES_RIGHT = "sticks", "slides to the left", "slides to the right"
 OFF, RESTS = "off the object", "at rest"
-STRIP = "Where the fingers land on the object, in order"
+STRIP = "Fingers on the object, in order"
 BOUNDS, OBSTACLE, TREE, SIMULATED = "bounds", "obstacle", "search tree", "simulated"
 
 
