@@ -15,14 +15,15 @@ import shapely
 import flatpush as fp
 from flatpush.experiments.crowded import carved
 from flatpush.geometry import compose, exp, relative, transform
-from flatpush.planning.obstacles import Task, task_of
+from flatpush.planning.obstacles import query_of
+from flatpush.planning.query import Query
 
 
-def carved_task(seed: int) -> Task:
-    """The task of a carved scene with the one push of its path."""
+def carved_query(seed: int) -> Query:
+    """The query of a carved scene with the one push of its path."""
     found = carved(seed, pushes=1)
     planner = fp.Planner(replace(found.scene, pushes=(found.options[found.path.pushes[0]].push,)))
-    return task_of(planner.scene, planner.usable, planner.fleet)
+    return query_of(planner.scene, planner.usable, planner.fleet)
 
 
 def gap(plan: fp.Plan) -> float:

@@ -1,5 +1,7 @@
-"""The robot-executed maze B with its stored pushes, many seeds: python benchmarks/maze_seeds.py [SEEDS [SECONDS]]."""
+"""The robot-executed maze B with its stored pushes, many seeds:
+FLATPUSH_DATA=… python benchmarks/maze_seeds.py [SEEDS [SECONDS]]."""
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -7,24 +9,24 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from tests.maze import check_way, stored_task
+from tests.maze import check_way, stored_query
 
 from flatpush.planning.obstacles import Search
 
 
 def main(seeds: int, seconds: float) -> None:
-    task = stored_task(Path(__file__).parents[2] / "shared" / "data", need=1.5e-5)
-    next(Search(task, 0).rounds())  # compiles
+    query = stored_query(Path(os.environ["FLATPUSH_DATA"]), need=1.5e-5)
+    next(Search(query, 0).rounds())  # compiles
     rows = []
     for seed in range(seeds):
-        search, began, clock, first = Search(task, seed), time.thread_time(), time.perf_counter(), None
+        search, began, clock, first = Search(query, seed), time.thread_time(), time.perf_counter(), None
         for way in search.rounds():
             if way is not None and first is None:
                 first = time.perf_counter() - clock
             if time.thread_time() - began > seconds:
                 break
         assert search.best is not None
-        check_way(task, search.best)
+        check_way(query, search.best)
         rows.append((first, search.cost))
     times, costs = np.array(rows).T
     print(f"first path {1e3 * np.median(times):.1f} ms median, {1e3 * times.max():.1f} ms at most")

@@ -19,7 +19,7 @@ from flatpush.geometry import Outline, transform
 from flatpush.geometry.collision import Body, World
 from flatpush.geometry.collision.kernels import pose_gap, twist_gap
 from flatpush.planning.obstacles.lattice import Lattice, Level, Reach
-from test_obstacles import CORNERS, task
+from test_obstacles import CORNERS, boxes
 
 OBSTACLES = 1, 3, 10, 30, 100, 300, 1000
 POSES = 1_000, 3_000, 10_000, 30_000, 100_000
@@ -83,7 +83,7 @@ def checks() -> list[tuple[float, ...]]:
 
 def poses() -> list[tuple[float, float, float]]:
     """Rows: poses of a lattice, seconds, MB."""
-    asked = task()
+    asked = boxes()
     reach, rows = Reach(asked), []
     for warm in (True, False):
         # A weight of zero: it spreads evenly and does not run for the goal.

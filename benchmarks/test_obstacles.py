@@ -19,11 +19,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
-from tests.maze import MAZE_A, MAZE_B, stored_task
+from tests.maze import MAZE_A, MAZE_B, stored_query
 
 from flatpush.geometry import Outline, compose, inverse
 from flatpush.geometry.collision import Body, World
-from flatpush.planning.obstacles import Search, Task
+from flatpush.planning.obstacles import Search
+from flatpush.planning.query import Query
 from flatpush.steering.fleet import Fleet
 
 RADIUS, MIDDLE, AHEAD = 0.0473, np.array([-0.0208, 0.0220]), np.deg2rad(192.1)
@@ -35,7 +36,7 @@ START, GOAL = np.array([0.1, 0.3, -1.5]), np.array([0.8, 0.3, 2.0])
 SEEDS, LIMIT, SPACING = 5, 2.0, 1e-3
 
 
-def task() -> Task:
+def boxes() -> Query:
     ahead = np.array([np.cos(AHEAD), np.sin(AHEAD)])
     left = np.array([-ahead[1], ahead[0]])
     free = np.full((1, 3), np.inf)
@@ -44,11 +45,11 @@ def task() -> Task:
         np.array([[RADIUS, 1.0, RADIUS]]), free, free, np.zeros((1, 1)),
     )  # fmt: skip
     body = Body.of(Outline.polygon(CORNERS), [(0.022167, 0.01375), (0.022167, -0.00425)], 0.0025)
-    boxes = [np.array([(a, b), (c, b), (c, d), (a, d)]) for a, b, c, d in BOXES]
-    return Task(fleet, World.of(BOUNDS, boxes), [body], np.array([[0.002, 0.0]]), START, GOAL, 0.0)
+    solids = [np.array([(a, b), (c, b), (c, d), (a, d)]) for a, b, c, d in BOXES]
+    return Query(fleet, START, GOAL, World.of(BOUNDS, solids), [body], np.array([[0.002, 0.0]]))
 
 
-def drawn(asked: Task, seed: int) -> Task:
+def drawn(asked: Query, seed: int) -> Query:
     """The same with a start and a goal drawn where the push can begin and end, a third of the box apart at least."""
     rng = np.random.default_rng(seed)
     box = asked.extent
@@ -56,11 +57,15 @@ def drawn(asked: Task, seed: int) -> Task:
     while True:
         start, goal = rng.uniform(low, high), rng.uniform(low, high)
         other = replace(asked, start=start, goal=goal)
-        if np.hypot(*(goal - start)[:2]) > np.min(box[2:] - box[:2]) / 3 and other.first and other.last:
+        if (
+            np.hypot(*(goal - start)[:2]) > min(box.xmax - box.xmin, box.ymax - box.ymin) / 3
+            and other.first
+            and other.last
+        ):
             return other
 
 
-def only(asked: Task, push: int) -> Task:
+def only(asked: Query, push: int) -> Query:
     """The same with one push."""
     fleet, one = asked.fleet, slice(push, push + 1)
     fleet = replace(
@@ -74,19 +79,19 @@ def only(asked: Task, push: int) -> Task:
     return replace(asked, fleet=fleet, bodies=[asked.bodies[push]], backs=asked.backs[one])
 
 
-def scenes() -> dict[str, list[Task]]:
-    found = {"boxes": [task(), *(drawn(task(), k) for k in range(7))]}
+def scenes() -> dict[str, list[Query]]:
+    found = {"boxes": [boxes(), *(drawn(boxes(), k) for k in range(7))]}
     data = os.environ.get("FLATPUSH_DATA")
     if data:
-        mazes = [stored_task(Path(data), name, need=1.5e-5) for name in (MAZE_A, MAZE_B)]
+        mazes = [stored_query(Path(data), name, need=1.5e-5) for name in (MAZE_A, MAZE_B)]
         found["mazes"] = [drawn(only(mazes[k % 2], 1), k) for k in range(8)]
-    from carved import carved_task
+    from carved import carved_query
 
-    found["carved"] = [carved_task(k) for k in range(8)]
+    found["carved"] = [carved_query(k) for k in range(8)]
     return found
 
 
-def ours(asked: Task, seed: int) -> float:
+def ours(asked: Query, seed: int) -> float:
     search, began = Search(asked, seed), time.perf_counter()
     for way in search.rounds():
         spent = time.perf_counter() - began
@@ -100,7 +105,7 @@ def ours(asked: Task, seed: int) -> float:
 class Ompl:
     """RRT of one push's flat point in a Dubins space; counts the poses that it asks about."""
 
-    def __init__(self, asked: Task, spacing: float) -> None:
+    def __init__(self, asked: Query, spacing: float) -> None:
         from ompl import base, geometric
 
         from flatpush.geometry.collision.kernels import pose_gap
@@ -159,7 +164,7 @@ def test_first_path_next_to_ompl():
 
     util.setLogLevel(util.LOG_NONE)
     every = scenes()
-    ours(task(), 0)
+    ours(boxes(), 0)
     a_all, b_all, count, spent = [], [], 0, 0.0
     print()
     for name, tasks in every.items():

@@ -18,6 +18,7 @@ import pytest
 
 from flatpush.contact import PointContact
 from flatpush.friction import Ellipsoid
+from flatpush.planning.query import Query
 from flatpush.planning.refine import refine
 from flatpush.steering.car import Car
 from flatpush.steering.fleet import Fleet
@@ -54,10 +55,10 @@ def starts_of(count: int) -> np.ndarray:
 
 def columns(fleet: Fleet, start: np.ndarray) -> tuple[list[float], list[float]]:
     """Costs of the best single push and of ROUNDS of refinement, and the times of these [s]."""
-    costs, times = [refine(fleet, start, GOAL, rounds=0).cost], []
+    costs, times = [refine(Query(fleet, start, GOAL), rounds=0).cost], []
     for rounds in ROUNDS:
         begun = time.thread_time()
-        costs.append(refine(fleet, start, GOAL, rounds=rounds).cost)
+        costs.append(refine(Query(fleet, start, GOAL), rounds=rounds).cost)
         times.append(time.thread_time() - begun)
     return costs, times
 
@@ -66,7 +67,7 @@ def table(name: str, count: int) -> np.ndarray:
     """Gaps to the best known [%], shape (queries, 4); prints median and 95th percentile of each column."""
     best = np.array(json.loads(STORE.read_text())[name][:count])
     fleet = fleet_of(name)
-    refine(fleet, [0.1, 0.1, 1.0], GOAL, rounds=1)
+    refine(Query(fleet, [0.1, 0.1, 1.0], GOAL), rounds=1)
     results = [columns(fleet, start) for start in starts_of(len(best))]
     costs = np.array([c for c, _ in results])
     times = np.array([t for _, t in results])
@@ -88,8 +89,8 @@ def test_quality(name):
 @pytest.mark.parametrize("name", list(MODELS))
 def test_query_time(benchmark, name):
     fleet, start = fleet_of(name), starts_of(1)[0]
-    refine(fleet, start, GOAL, rounds=1)
-    benchmark.pedantic(refine, (fleet, start, GOAL), {"rounds": 3}, rounds=5, iterations=1)
+    refine(Query(fleet, start, GOAL), rounds=1)
+    benchmark.pedantic(refine, (Query(fleet, start, GOAL),), {"rounds": 3}, rounds=5, iterations=1)
 
 
 def search_best(count: int) -> None:
@@ -97,7 +98,7 @@ def search_best(count: int) -> None:
     for name in MODELS:
         fleet, best = fleet_of(name), stored.get(name, [])
         for number, start in enumerate(starts_of(count)):
-            cost = min(refine(fleet, start, GOAL, rounds=50, seed=s).cost for s in (1, 2, 3))
+            cost = min(refine(Query(fleet, start, GOAL), rounds=50, seed=s).cost for s in (1, 2, 3))
             if number < len(best):
                 best[number] = min(best[number], round(cost, 7))
             else:

@@ -10,7 +10,8 @@ import shapely
 import flatpush as fp
 from flatpush.geometry import Outline, compose, exp, transform
 from flatpush.geometry.collision import Body, World
-from flatpush.planning.obstacles import Task, task_of
+from flatpush.planning.obstacles import query_of
+from flatpush.planning.query import Query
 from flatpush.steering.fleet import Fleet
 
 MAZE_A = "maze2_verytight_mu05steerdist05k100_robotexecute"
@@ -27,13 +28,13 @@ def maze_scene(**planning) -> fp.Scene:
     return replace(scene, pushes="auto", planning=asked)
 
 
-def maze_task(need=0.0) -> Task:
+def maze_query(need=0.0) -> Query:
     """The search of that maze."""
     planner = fp.Planner(maze_scene())
-    return replace(task_of(planner.scene, planner.usable, planner.fleet), clearance=need)
+    return replace(query_of(planner.scene, planner.usable, planner.fleet), clearance=need)
 
 
-def stored_task(folder, name=MAZE_B, need=0.0, approach=0.002) -> Task:
+def stored_query(folder, name=MAZE_B, need=0.0, approach=0.002) -> Query:
     """A stored maze: contacts at the middle of the tip centres, cars and switching cost as in its file."""
     document = json.loads((folder / "maze" / f"{name}.json").read_text())
     outline = Outline.polygon(document["object_vertices_xy"])
@@ -65,7 +66,7 @@ def stored_task(folder, name=MAZE_B, need=0.0, approach=0.002) -> Task:
     xmin, xmax, ymin, ymax = document["boundary_xmin_xmax_ymin_ymax"]
     world = World.of([xmin, ymin, xmax, ymax], [np.array(o) for o in document["obstacles_xy"]])
     start, goal = np.array(document["pose_start"]), np.array(document["pose_goal"])
-    return Task(fleet, world, bodies, np.array(backs), start, goal, need)
+    return Query(fleet, start, goal, world, bodies, np.array(backs), need)
 
 
 def dense_clearance(world: World, body: Body, start, steps, spacing=1e-4) -> float:
@@ -101,18 +102,18 @@ def dense_clearance(world: World, body: Body, start, steps, spacing=1e-4) -> flo
     return float(best)
 
 
-def check_way(task: Task, way, need=0.0) -> None:
+def check_way(query: Query, way, need=0.0) -> None:
     """Ends at the goal, keeps the clearance by dense samples, and lands and leaves clear at every change."""
-    assert np.max(np.abs(compose(way.poses[-1], [0, 0, 0])[:2] - task.goal[:2])) < 1e-8
-    assert abs(np.remainder(way.poses[-1][2] - task.goal[2] + np.pi, 2 * np.pi) - np.pi) < 1e-8
+    assert np.max(np.abs(compose(way.poses[-1], [0, 0, 0])[:2] - query.goal[:2])) < 1e-8
+    assert abs(np.remainder(way.poses[-1][2] - query.goal[2] + np.pi, 2 * np.pi) - np.pi) < 1e-8
     pieces, pose = [], way.start
     for i, (push, letter, amount) in enumerate(way.pieces):
         pieces.append(way.step(push, letter, amount))
         if i + 1 == len(way.pieces) or way.pieces[i + 1][0] != push:
-            assert dense_clearance(task.world, task.bodies[push], pose, pieces) >= need, (push, i)
+            assert dense_clearance(query.world, query.bodies[push], pose, pieces) >= need, (push, i)
             for at in (pose, way.poses[i + 1]):
-                hand = Body.of(Outline.circle(task.bodies[push].radius))
-                for tip in task.bodies[push].discs:
-                    a, b = transform(at, tip), transform(at, tip + task.backs[push])
-                    assert dense_clearance(task.world, hand, [*a, 0.0], [[*(b - a), 0.0]]) >= need - 1e-5
+                hand = Body.of(Outline.circle(query.bodies[push].radius))
+                for tip in query.bodies[push].discs:
+                    a, b = transform(at, tip), transform(at, tip + query.backs[push])
+                    assert dense_clearance(query.world, hand, [*a, 0.0], [[*(b - a), 0.0]]) >= need - 1e-5
             pieces, pose = [], way.poses[i + 1]

@@ -7,6 +7,7 @@ import pytest
 
 from flatpush.contact import PointContact
 from flatpush.friction import Ellipsoid
+from flatpush.planning.query import Query
 from flatpush.planning.refine import refine
 from flatpush.steering.car import Car
 from flatpush.steering.fleet import Fleet
@@ -49,7 +50,7 @@ def cases(data_folder):
 def test_the_nine_robot_queries_are_planned_better(data_folder):
     compared = 0
     for name, fleet, start, stored, best in cases(data_folder):
-        found = refine(fleet, start, np.zeros(3))
+        found = refine(Query(fleet, start, np.zeros(3)))
         assert found.cost <= 0.93 * stored, (name, start)
         assert found.cost <= 1.05 * best, (name, start)
         compared += 1
@@ -59,14 +60,14 @@ def test_the_nine_robot_queries_are_planned_better(data_folder):
 def test_robust_plans_of_the_nine_queries_cost_little_more(data_folder):
     """Three percent, where the cheapest plans cost up to ten times as much to replan."""
     for name, fleet, start, _, best in cases(data_folder):
-        found = refine(fleet, start, np.zeros(3), robust=True)
+        found = refine(Query(fleet, start, np.zeros(3), robust=True))
         assert found.replanning_cost <= 1.05 * best, (name, start)
         assert found.replanning_cost == pytest.approx(found.cost, rel=5e-3)
 
 
 def test_the_authors_own_sequences_are_improved_at_once(data_folder):
     """Their switch poses as the only seed, no other search: the descent alone."""
-    from flatpush.planning.refine.problem import Candidate, Query
+    from flatpush.planning.refine.problem import Candidate, Sequences
 
     folder = data_folder / "plan_graph"
     reference = json.loads((folder / "requery_reference.json").read_text())
@@ -78,8 +79,8 @@ def test_the_authors_own_sequences_are_improved_at_once(data_folder):
         )
         poses = np.array(way["waypoints_rel_goal_mm_mm_deg"]) * [1e-3, 1e-3, np.pi / 180]
         poses[0], poses[-1] = start, 0.0
-        query = Query.of(fleet, start, np.zeros(3), 5e-3)
-        seed = query.candidate(np.array(way["actions"]) - 1, poses)
+        sequences = Sequences.of(Query(fleet, start, np.zeros(3)), 5e-3)
+        seed = sequences.candidate(np.array(way["actions"]) - 1, poses)
         assert seed.cost == pytest.approx(stored, rel=2e-3)  # stored poses have few digits
-        found = query.descend(Candidate(seed.cost, seed.pushes, seed.poses), 6, 80)
+        found = sequences.descend(Candidate(seed.cost, seed.pushes, seed.poses), 6, 80)
         assert found.cost < 0.97 * seed.cost

@@ -15,7 +15,6 @@ CIRCLES = {
     frozenset({"flatpush.view.drawing", "flatpush.view.raster", "flatpush.view.svg"}),
     frozenset({"flatpush.steering.dubins", "flatpush.steering.lengths"}),
     frozenset({"flatpush.documents.mechanics", "flatpush.documents.surface_file"}),
-    frozenset({"flatpush.planning.obstacles.kernels", "flatpush.planning.obstacles.task"}),
 }
 BARE_COLUMNS = {
     "control.laws.rollout_kernel.many",

@@ -14,132 +14,109 @@ from flatpush.planning.obstacles import Search
 from flatpush.planning.obstacles.lattice import Lattice, Level, Reach
 from flatpush.planning.obstacles.polish import Chain
 from flatpush.planning.obstacles.trees import Trees
-from flatpush.planning.path import Path
-from flatpush.steering.three_twist import words
+from flatpush.planning.path import Path, pieces_of
 
-from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, maze_scene, maze_task, stored_task
+from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, maze_query, maze_scene, stored_query
 
 NEED = 1.5e-5
 
 
 @pytest.fixture(scope="module")
-def task():
-    return maze_task(NEED)
+def query():
+    return maze_query(NEED)
 
 
-def searched(task, seed, work):
-    search = Search(task, seed)
+def searched(query, seed, work):
+    search = Search(query, seed)
     for _ in search.rounds():
         if search.work >= work:
             break
     return search
 
 
-def test_compiled_words_are_those_of_three_twist(task):
-    from flatpush.planning.obstacles.kernels import COLUMNS, WORDS, words_between
-
-    rng = np.random.default_rng(0)
-    out, fleet = np.empty((WORDS, COLUMNS)), task.fleet
-    for _ in range(60):
-        a = int(rng.integers(fleet.size))
-        start, goal = rng.uniform(-0.2, 0.2, 3) * [1, 1, 10], rng.uniform(-0.2, 0.2, 3) * [1, 1, 10]
-        count = words_between(task.arrays, a, start, goal, out)
-        plain = words(fleet.left[a], fleet.right[a], fleet.direction[a], start, goal)
-        costs = sorted(
-            sum(fleet.rates[a, "LSR".index(x)] * p for x, p in zip(w.word, w.parameters, strict=True))
-            for w in plain
-        )
-        assert count == len(costs)
-        assert np.allclose(out[:count, 0], costs, atol=1e-9)
-        for row in out[:count]:
-            pieces = [(a, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)]
-            end = Path.of(fleet, start, pieces).poses[-1]
-            assert np.allclose(end[:2], goal[:2], atol=1e-9)
-            assert np.allclose(np.exp(1j * end[2]), np.exp(1j * goal[2]), atol=1e-9)
-
-
-def test_compiled_edges_keep_clear_where_their_displacements_do(task):
-    from flatpush.planning.obstacles.kernels import COLUMNS, word_clear
+def test_compiled_edges_keep_clear_where_their_displacements_do(query):
+    from flatpush.planning.obstacles.kernels import word_clear
+    from flatpush.steering.six_words import WORD
 
     rng = np.random.default_rng(1)
-    T, fleet, row = task.arrays, task.fleet, np.zeros(COLUMNS)
+    T, fleet, drawn = query.arrays, query.fleet, np.zeros(1, WORD)
     decided = {True: 0, False: 0}
     while sum(decided.values()) < 300:
         a = int(rng.integers(fleet.size))
         start = rng.uniform([0, 0, -3], [0.32, 0.25, 3])
-        if pose_clearance(task.world, task.bodies[a], start) < task.clearance:
+        if pose_clearance(query.world, query.bodies[a], start) < query.clearance:
             continue
-        row[1::2], row[2::2] = rng.integers(0, 3, 3), rng.uniform(0.0, 0.08, 3)
-        row[2::2] *= np.where(row[1::2] == 1, 0.5, 6.0)
-        way = Path.of(fleet, start, [(a, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)])
+        letters, amounts = rng.integers(0, 3, 3), rng.uniform(0.0, 0.08, 3)
+        drawn["letter"], drawn["amount"] = letters, amounts * np.where(letters == 1, 0.5, 6.0)
+        way = Path.of(fleet, start, pieces_of(a, drawn[0]))
         steps = [way.step(*piece) for piece in way.pieces]
-        gap = path_clearance(task.world, task.bodies[a], start, steps).distance
-        decided[bool(word_clear(T, a, start, row))] += 1
-        assert word_clear(T, a, start, row) == (gap >= task.clearance)
+        gap = path_clearance(query.world, query.bodies[a], start, steps).distance
+        decided[bool(word_clear(T, a, start, drawn, 0))] += 1
+        assert word_clear(T, a, start, drawn, 0) == (gap >= query.clearance)
     assert min(decided.values()) > 20
 
 
-def test_a_lattice_finds_the_maze_at_once_and_its_way_is_free(task):
-    lattice = Lattice(task, Reach(task), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
+def test_a_lattice_finds_the_maze_at_once_and_its_way_is_free(query):
+    lattice = Lattice(query, Reach(query), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
     while not lattice.done:
         lattice.advance(100, np.inf)
     assert lattice.path.cost == pytest.approx(lattice.queue.best[0])
     assert lattice.path.cost < 0.8
-    check_way(task, lattice.path)
+    check_way(query, lattice.path)
 
 
-def test_backwards_is_the_same_way(task):
-    back = task.reversed
+def test_backwards_is_the_same_way(query):
+    back = query.reversed
     lattice = Lattice(back, Reach(back), Level(0.015, 24, 0.02), np.inf, np.random.default_rng(0))
     while lattice.queue.best[1] < 0:
         lattice.advance(200, np.inf)
-    way = lattice.path.backwards(task.fleet, task.start)
+    way = lattice.path.backwards(query.fleet, query.start)
     assert way.cost == pytest.approx(lattice.path.cost)
-    check_way(task, way)
+    check_way(query, way)
 
 
-def test_polish_shortens_and_stays_free(task):
-    lattice = Lattice(task, Reach(task), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
+def test_polish_shortens_and_stays_free(query):
+    lattice = Lattice(query, Reach(query), Level(0.02, 16, 0.03), np.inf, np.random.default_rng(0))
     while not lattice.done:
         lattice.advance(100, np.inf)
-    chain = Chain(task, lattice.path, 3)
+    chain = Chain(query, lattice.path, 3)
     assert chain.cost <= lattice.path.cost + 1e-12
     for _ in range(5):
         chain.improve(500)
-        check_way(task, chain.path)
+        check_way(query, chain.path)
         assert chain.path.cost <= chain.cost + 1e-12
     assert chain.cost < 0.98 * lattice.path.cost
 
 
-def test_random_trees_find_a_first_way(task):
+def test_random_trees_find_a_first_way(query):
     for seed in range(12):
-        trees = Trees(task, seed)
+        trees = Trees(query, seed)
         if trees.path is not None:
-            check_way(task, trees.path)
-    one, two = Trees(task, 7), Trees(task, 7)
+            check_way(query, trees.path)
+    one, two = Trees(query, 7), Trees(query, 7)
     assert one.path is not None
     assert one.path.pieces == two.path.pieces
     # Where a word leads straight to the goal, it is found without any tree.
-    near = replace(task, goal=Path.of(task.fleet, task.start, [(1, 1, 0.01), (1, 0, 0.2)]).poses[-1])
+    near = replace(query, goal=Path.of(query.fleet, query.start, [(1, 1, 0.01), (1, 0, 0.2)]).poses[-1])
     assert Trees(near, 0, 3).work <= 3
     assert Trees(near, 0, 3).path is not None
-    assert Trees(task, 0, 3).path is None
+    assert Trees(query, 0, 3).path is None
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_robot_maze_is_solved_and_improved(task, seed):
+def test_the_robot_maze_is_solved_and_improved(query, seed):
     """The stored plan costs 0.862; after some tenths of a second ours cost what a prototype's took longer to reach."""
-    search = Search(task, seed)
+    search = Search(query, seed)
     first = next(way for way in search.rounds() if way is not None)
     assert search.work < 3000
-    check_way(task, first)
-    search = searched(task, seed, 60_000)
+    check_way(query, first)
+    search = searched(query, seed, 60_000)
     assert search.cost <= 0.685
-    check_way(task, search.best)
+    check_way(query, search.best)
 
 
-def test_same_seed_and_work_same_way(task):
-    one, two = searched(task, 5, 40_000), searched(task, 5, 40_000)
+def test_same_seed_and_work_same_way(query):
+    one, two = searched(query, 5, 40_000), searched(query, 5, 40_000)
     assert one.best.pieces == two.best.pieces
 
 
@@ -148,20 +125,20 @@ def test_every_stored_maze_is_solved_and_cheaper_than_its_stored_plan(data_folde
     stored = json.loads((data_folder / "maze" / "stored_paths_clearance_check.json").read_text())
     assert len(stored) == 12
     for row in stored:
-        task = stored_task(data_folder, row["maze"], need=NEED)
-        search = searched(task, 0, 20_000)
-        check_way(task, search.best)
+        query = stored_query(data_folder, row["maze"], need=NEED)
+        search = searched(query, 0, 20_000)
+        check_way(query, search.best)
         changes = sum(a != b for a, b in pairwise(row["actions"]))
-        assert search.cost < row["total_length_m"] + changes * task.fleet.switching.max()
+        assert search.cost < row["total_length_m"] + changes * query.fleet.switching.max()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [MAZE_A, MAZE_B])
 def test_narrow_passages_of_the_robot_mazes_are_found(data_folder, name):
     """Maze B: 0.62 with one change of push was known, and 0.423 without any."""
-    task = stored_task(data_folder, name, need=NEED)
-    search = searched(task, 1, 400_000)
-    check_way(task, search.best)
+    query = stored_query(data_folder, name, need=NEED)
+    search = searched(query, 1, 400_000)
+    check_way(query, search.best)
     assert search.cost <= {MAZE_A: 0.55, MAZE_B: 0.62}[name]
 
 
@@ -244,12 +221,12 @@ def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles():
     assert kept.cost <= fp.Planner(free).plan().cost * (1 + 1e-3)
 
 
-def test_offered_ways_must_be_free(task):
-    search = searched(task, 0, 5000)
-    other = Search(task, 1)
+def test_offered_ways_must_be_free(query):
+    search = searched(query, 0, 5000)
+    other = Search(query, 1)
     assert other.offer(search.best)
     assert other.cost <= search.cost
-    through = Path.of(task.fleet, task.start, [(1, 1, 0.3)])
+    through = Path.of(query.fleet, query.start, [(1, 1, 0.3)])
     assert not other.offer(through)
 
 
@@ -274,13 +251,13 @@ def test_round_objects_and_obstacles():
     assert 0.05 <= least < 0.1
 
 
-def test_pruned_paths_have_fewer_pieces_and_cost_hardly_more(task):
+def test_pruned_paths_have_fewer_pieces_and_cost_hardly_more(query):
     from flatpush.planning.obstacles import pruned
 
     fewer = 0
-    for way in (trees.path for trees in (Trees(task, seed) for seed in range(8)) if trees.path is not None):
-        tidy = pruned(task, way)
-        check_way(task, tidy)
+    for way in (trees.path for trees in (Trees(query, seed) for seed in range(8)) if trees.path is not None):
+        tidy = pruned(query, way)
+        check_way(query, tidy)
         gone = len(way.pieces) - len(tidy.pieces)
         assert gone >= 0
         assert tidy.pushes == way.pushes
@@ -289,6 +266,6 @@ def test_pruned_paths_have_fewer_pieces_and_cost_hardly_more(task):
     assert fewer > 0
     # A needless wiggle on a straight way becomes the straight way again.
     near = Path.of(
-        task.fleet, task.start, [(1, 1, 0.01), (1, 0, 1e-3), (1, 2, 1e-3), (1, 0, 1e-3), (1, 1, 0.004)]
+        query.fleet, query.start, [(1, 1, 0.01), (1, 0, 1e-3), (1, 2, 1e-3), (1, 0, 1e-3), (1, 1, 0.004)]
     )
-    assert len(pruned(task, near).pieces) <= 3
+    assert len(pruned(query, near).pieces) <= 3

@@ -7,9 +7,10 @@ import pytest
 
 from flatpush.errors import InputError
 from flatpush.geometry import compose, exp, pose_error, rotate
+from flatpush.planning.query import Query
 from flatpush.planning.refine import improvements, refine
 from flatpush.planning.refine.pool import arc_seeds, pool_seeds, sample_poses
-from flatpush.planning.refine.problem import Query
+from flatpush.planning.refine.problem import Sequences
 from flatpush.steering import three_twist
 from flatpush.steering.fleet import Fleet
 from flatpush.steering.six_words import MOST_WORDS, WORD, every_word
@@ -70,10 +71,10 @@ def plain_cost(fleet, plan):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_leg_costs_what_the_plain_words_cost(kind):
     fleet, rng = KINDS[kind], np.random.default_rng(1)
-    query = Query.of(fleet, GOAL, GOAL, 0.0)
+    sequences = Sequences.of(Query(fleet, GOAL, GOAL), 0.0)
     for start, goal in zip(random_poses(rng, 60), random_poses(rng, 60), strict=True):
         push = int(rng.integers(fleet.size))
-        cost, (word,) = query.chain(np.array([push]), np.array([start, goal]))
+        cost, (word,) = sequences.chain(np.array([push]), np.array([start, goal]))
         assert cost == word["cost"] == pytest.approx(plain_leg(fleet, push, start, goal), rel=1e-9)
         amounts = dict(zip("LSR", np.zeros(3), strict=True))
         for letter, amount in zip(word["letter"], word["amount"], strict=True):
@@ -108,14 +109,14 @@ def test_every_word_is_found_with_its_price(kind):
 def test_a_leg_of_one_arc_has_no_spurious_turn():
     """The ends of good plans' legs are met by fewer arcs than three, and rounding then makes arcs of -1e-17."""
     fleet = KINDS["general"]
-    query = Query.of(fleet, GOAL, GOAL, 0.0)
+    sequences = Sequences.of(Query(fleet, GOAL, GOAL), 0.0)
     rng = np.random.default_rng(0)
     for start in random_poses(rng, 100):
         amount = rng.uniform(0.05, 1.5)
         for motion, centre in ((0, fleet.left[1]), (2, fleet.right[1])):
             sense = 1 - motion
             end = compose(start, exp(sense * amount * np.array([centre[1], -centre[0], 1.0])))
-            cost, _ = query.chain(np.array([1]), np.array([start, end]))
+            cost, _ = sequences.chain(np.array([1]), np.array([start, end]))
             assert cost <= amount * fleet.rates[1, motion] + 1e-9
 
 
@@ -123,7 +124,7 @@ def test_a_leg_of_one_arc_has_no_spurious_turn():
 def test_answers_are_what_they_say(kind):
     fleet = KINDS[kind]
     for start in random_poses(np.random.default_rng(2), 3):
-        found = refine(fleet, start, GOAL, rounds=1)
+        found = refine(Query(fleet, start, GOAL), rounds=1)
         assert found.cost == pytest.approx(plain_cost(fleet, found), rel=1e-7)
         assert found.cost <= min(plain_leg(fleet, k, start, GOAL) for k in range(fleet.size)) * (1 + 1e-9)
         pose = start
@@ -140,7 +141,7 @@ def test_answers_are_what_they_say(kind):
 def test_no_small_move_of_a_switch_pose_lowers_the_cost_much(kind):
     """After the descent the plan is a local minimum; a random probe in the plain cost finds nothing better."""
     fleet, rng = KINDS[kind], np.random.default_rng(3)
-    found = refine(fleet, [0.05, -0.04, 2.0], GOAL, rounds=2)
+    found = refine(Query(fleet, [0.05, -0.04, 2.0], GOAL), rounds=2)
     assert len(found.pushes) > 1
     for _ in range(150):
         poses = found.poses.copy()
@@ -157,8 +158,8 @@ def test_a_descent_beats_a_general_optimiser():
     fleet, rng = KINDS["dubins"], np.random.default_rng(4)
     won = 0
     for start in random_poses(rng, 6):
-        query = Query.of(fleet, start, GOAL, 0.0)
-        seed = pool_seeds(query, sample_poses(query, rng, 100, []), 2)[0]
+        sequences = Sequences.of(Query(fleet, start, GOAL), 0.0)
+        seed = pool_seeds(sequences, sample_poses(sequences, rng, 100, []), 2)[0]
         first, last = seed.pushes.tolist()
 
         def cost(x, first=first, last=last, start=start):
@@ -166,7 +167,7 @@ def test_a_descent_beats_a_general_optimiser():
 
         assert seed.cost == pytest.approx(cost(seed.poses[1]), rel=1e-9)
         other = minimize(cost, seed.poses[1], method="Nelder-Mead", options={"maxfev": 150}).fun
-        ours = query.descend(seed, 6, 80)
+        ours = sequences.descend(seed, 6, 80)
         assert ours.cost < seed.cost
         won += ours.cost <= other + 1e-6
     assert won >= 5
@@ -186,15 +187,15 @@ def test_three_arcs_of_three_pushes_are_found_exactly(motions):
             twist = np.array([*fleet.direction[push], 0.0]) if motion == 1 else turn
             pose = compose(pose, exp(-amounts[push] * twist))
             total += amounts[push] * fleet.rates[push, motion]
-        seeds = arc_seeds(Query.of(fleet, pose, GOAL, 0.0), rng, True)
+        seeds = arc_seeds(Sequences.of(Query(fleet, pose, GOAL), 0.0), rng, True)
         assert seeds[0].cost <= total * (1 + 1e-9)
-        assert refine(fleet, pose, GOAL, rounds=1).cost <= total * (1 + 1e-9)
+        assert refine(Query(fleet, pose, GOAL), rounds=1).cost <= total * (1 + 1e-9)
 
 
 def test_legs_are_as_long_as_asked():
     fleet = fleet_of(switching=0.0)
     for least in (0.005, 0.03):
-        found = refine(fleet, [0.03, 0.02, 1.0], GOAL, rounds=2, least=least)
+        found = refine(Query(fleet, [0.03, 0.02, 1.0], GOAL), rounds=2, least=least)
         flat = np.where(
             [[k == "S" for k in w] for w in found.words],
             found.amounts,
@@ -206,10 +207,10 @@ def test_legs_are_as_long_as_asked():
 
 def test_answers_improve_and_repeat():
     fleet, start = KINDS["dubins"], [0.06, 0.02, 2.6]
-    costs = [found.cost for found in islice(improvements(fleet, start, GOAL), 5)]
+    costs = [found.cost for found in islice(improvements(Query(fleet, start, GOAL)), 5)]
     assert costs == sorted(costs, reverse=True)
     assert costs[0] == pytest.approx(min(plain_leg(fleet, k, start, GOAL) for k in range(3)))
-    again, other = (refine(fleet, start, GOAL, rounds=3, seed=seed) for seed in (0, 0))
+    again, other = (refine(Query(fleet, start, GOAL), rounds=3, seed=seed) for seed in (0, 0))
     np.testing.assert_array_equal(again.poses, other.poses)
     assert again.cost == other.cost
 
@@ -217,14 +218,14 @@ def test_answers_improve_and_repeat():
 def test_seeds_are_used_and_needless_switches_removed():
     fleet = fleet_of(k=2, switching=0.2)
     start = np.array([-0.15, -0.04, 0.1])
-    single = refine(fleet, start, GOAL, rounds=0)
+    single = refine(Query(fleet, start, GOAL), rounds=0)
     silly = ([0, 0, 1, 0], [start, [0.1, 0.1, 0.1], [0.0, 0.2, 1.0], [0.1, 0, 0], GOAL])
-    found = refine(fleet, start, GOAL, [silly], rounds=1)
+    found = refine(Query(fleet, start, GOAL), [silly], rounds=1)
     assert len(found.pushes) == 1
     assert found.cost == pytest.approx(single.cost)
     # Without other rounds the seed itself is the first answer where it is better.
-    better = refine(fleet_of(), [0.06, 0.02, 2.6], GOAL, rounds=2)
-    first = refine(fleet_of(), [0.06, 0.02, 2.6], GOAL, [(better.pushes, better.poses)], rounds=0)
+    better = refine(Query(fleet_of(), [0.06, 0.02, 2.6], GOAL), rounds=2)
+    first = refine(Query(fleet_of(), [0.06, 0.02, 2.6], GOAL), [(better.pushes, better.poses)], rounds=0)
     assert first.cost == pytest.approx(better.cost, rel=1e-9)
     assert first.cost_before == first.cost
 
@@ -233,16 +234,16 @@ def test_another_push_does_not_make_the_answer_worse():
     rng = np.random.default_rng(6)
     for start in random_poses(rng, 4):
         big = fleet_of(k=6)
-        many = refine(big, start, GOAL)
+        many = refine(Query(big, start, GOAL))
         part = Fleet(*(getattr(big, n)[:3] for n in ("left", "right", "direction", "rates", "speeds",
                                                        "accelerations")), big.switching[:3, :3])  # fmt: skip
-        few = refine(part, start, GOAL)
+        few = refine(Query(part, start, GOAL))
         assert many.cost <= 1.005 * few.cost
 
 
 def test_robust_plans_are_cheaper_to_replan():
     fleet, start = KINDS["dubins"], [0.06, 0.02, 2.6]
-    cheap, robust = (refine(fleet, start, GOAL, robust=robust) for robust in (False, True))
+    cheap, robust = (refine(Query(fleet, start, GOAL, robust=robust)) for robust in (False, True))
     assert robust.replanning_cost <= cheap.replanning_cost
     assert robust.replanning_cost < 1.05 * cheap.cost
     assert cheap.cost <= robust.cost
@@ -252,16 +253,16 @@ def test_forbidden_changes_are_not_made():
     fleet = fleet_of()
     fleet.switching[0, 1] = fleet.switching[1, 0] = np.inf
     for start in random_poses(np.random.default_rng(7), 3):
-        found = refine(fleet, start, GOAL, rounds=2)
+        found = refine(Query(fleet, start, GOAL), rounds=2)
         assert np.isfinite(found.cost)
         assert not {(0, 1), (1, 0)} & set(zip(found.pushes[:-1], found.pushes[1:], strict=True))
 
 
 def test_one_push_alone_and_start_at_the_goal():
     fleet = fleet_of(k=1)
-    found = refine(fleet, [0.1, 0.0, 0.5], GOAL)
+    found = refine(Query(fleet, [0.1, 0.0, 0.5], GOAL))
     assert found.cost == pytest.approx(plain_leg(fleet, 0, [0.1, 0.0, 0.5], GOAL))
-    assert refine(fleet_of(), GOAL, GOAL, rounds=1).cost == 0.0
+    assert refine(Query(fleet_of(), GOAL, GOAL), rounds=1).cost == 0.0
 
 
 @pytest.mark.parametrize(
@@ -277,8 +278,11 @@ def test_one_push_alone_and_start_at_the_goal():
     ],
 )
 def test_bad_input(change, text):
+    def asked(start=(0.1, 0, 0), goal=GOAL, **how):
+        return refine(Query(fleet_of(), start, goal), **how)
+
     with pytest.raises(InputError, match=text):
-        refine(**{"fleet": fleet_of(), "start": [0.1, 0, 0], "goal": GOAL, **change})
+        asked(**change)
 
 
 @pytest.mark.parametrize("kind", ["dubins", "general"])
@@ -286,10 +290,10 @@ def test_pool_seeds_are_the_best_over_their_poses(kind):
     """Brute force over all sequences and all switch poses of a small pool."""
     fleet = KINDS[kind]
     start = np.array([0.06, 0.02, 2.6])
-    query = Query.of(fleet, start, GOAL, 0.0)
-    poses = sample_poses(query, np.random.default_rng(8), 12, [])
-    first, last = query.table(start[None], poses)[:, 0], query.table(poses, GOAL[None])[:, :, 0]
-    inner = query.table(poses, poses)
+    sequences = Sequences.of(Query(fleet, start, GOAL), 0.0)
+    poses = sample_poses(sequences, np.random.default_rng(8), 12, [])
+    first, last = sequences.table(start[None], poses)[:, 0], sequences.table(poses, GOAL[None])[:, :, 0]
+    inner = sequences.table(poses, poses)
     best = {}
     for i, j in product(range(3), repeat=2):
         if i != j:
@@ -299,23 +303,23 @@ def test_pool_seeds_are_the_best_over_their_poses(kind):
                 for g in set(range(3)) - {h}:
                     tail = np.min(inner[j][:, :, None] + inner[h][None] + last[g], axis=(1, 2))
                     best[i, j, h, g] = np.min(first[i] + tail) + 0.06
-    seeds = pool_seeds(query, poses, 4)
+    seeds = pool_seeds(sequences, poses, 4)
     assert [s.cost for s in seeds] == sorted(s.cost for s in seeds)
     assert len({s.key for s in seeds}) == len(seeds)
     for seed in seeds:
         if len(seed.pushes) < 4:  # of longer ones only promising tails are looked at
             assert seed.cost == pytest.approx(best[seed.key], rel=1e-9)
         assert seed.cost >= best[seed.key] * (1 - 1e-9)
-        assert query.candidate(seed.pushes, seed.poses).cost <= seed.cost * (1 + 1e-9)
+        assert sequences.candidate(seed.pushes, seed.poses).cost <= seed.cost * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_replanning_costs_what_the_plain_words_cost(kind):
     """Mean over the sixteen displacements; the first leg starts where it starts."""
     fleet = KINDS[kind]
-    query = Query.of(fleet, np.array([0.06, 0.02, 2.6]), GOAL, 0.0)
+    sequences = Sequences.of(Query(fleet, np.array([0.06, 0.02, 2.6]), GOAL), 0.0)
     switch = np.array([0.05, -0.03, 0.4])
-    found = query.candidate(np.array([0, 1]), np.array([query.start, switch, GOAL]))
+    found = sequences.candidate(np.array([0, 1]), np.array([sequences.start, switch, GOAL]))
     turn = np.deg2rad(0.2)
     displaced = [
         switch + np.array([2e-4 * np.cos(a), 2e-4 * np.sin(a), sign * turn])
@@ -323,16 +327,16 @@ def test_replanning_costs_what_the_plain_words_cost(kind):
         for sign in (1, -1)
     ]
     second = np.mean([plain_leg(fleet, 1, pose, GOAL) for pose in displaced])
-    first = plain_leg(fleet, 0, query.start, switch)
-    assert query.replanning(found) == pytest.approx(first + second + fleet.switching[0, 1], rel=1e-9)
+    first = plain_leg(fleet, 0, sequences.start, switch)
+    assert sequences.replanning(found) == pytest.approx(first + second + fleet.switching[0, 1], rel=1e-9)
 
 
 def test_the_descent_ends_at_the_minimum():
     """Going on for thousands of steps gains less than 1e-9; without the curvature of the chain in the Hessian 4e-8."""
     fleet, rng = KINDS["general"], np.random.default_rng(10)
     for start in random_poses(rng, 10):
-        query = Query.of(fleet, start, GOAL, 0.0)
-        seed = pool_seeds(query, sample_poses(query, rng, 200, []), 3)[0]
-        found = query.descend(seed, 6, 80)
-        longer = min(query.descend(found, 6, 4000).cost, query.descend(seed, 12, 4000).cost)
+        sequences = Sequences.of(Query(fleet, start, GOAL), 0.0)
+        seed = pool_seeds(sequences, sample_poses(sequences, rng, 200, []), 3)[0]
+        found = sequences.descend(seed, 6, 80)
+        longer = min(sequences.descend(found, 6, 4000).cost, sequences.descend(seed, 12, 4000).cost)
         assert found.cost <= longer * (1 + 1e-9)

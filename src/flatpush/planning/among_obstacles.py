@@ -13,7 +13,7 @@ from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Segments, assemble
 from .empty_table import Found, refined_paths
-from .obstacles import Search, careful, obstructions, pruned, task_of
+from .obstacles import Search, careful, obstructions, pruned, query_of
 from .options import PushOption
 from .path import Path
 from .segments import SAG
@@ -46,15 +46,15 @@ class AmongObstacles:
         progress: Progress | None,
     ) -> None:
         self.scene, self.options, self.transits, self.progress = scene, options, transits, progress
-        self.task = task_of(scene, options, fleet)
-        self.search = Search(self.task, scene.planning.seed)
+        self.query = query_of(scene, options, fleet)
+        self.search = Search(self.query, scene.planning.seed)
         self.best, self.refused = np.inf, 0
         self.complaint = self.stopped_by = ""
         self._first: float | None = None
 
     def plans(self) -> Iterator[tuple[Found, Segments]]:
         """Better and better paths that are plans as a whole; ends with the limits of the scene."""
-        self.complaint = obstructions(self.scene, self.task, self.options)
+        self.complaint = obstructions(self.scene, self.query, self.options)
         if self.complaint:
             return
         began = clock()
@@ -62,9 +62,9 @@ class AmongObstacles:
             plan = self._checked(path, began)
             if plan is not None:
                 yield plan
-            elif self.search.task is self.task:
+            elif self.search.query is self.query:
                 # The hand did not find its way at a change of push: from now on changes have room to spare.
-                self.search = Search(careful(self.scene, self.task), self.scene.planning.seed)
+                self.search = Search(careful(self.scene, self.query), self.scene.planning.seed)
                 break
         else:
             return
@@ -104,7 +104,7 @@ class AmongObstacles:
     def _free(self, search: Search) -> bool:
         """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
         clear = False
-        for done, found in enumerate(refined_paths(self.scene, self.task.fleet)):
+        for done, found in enumerate(refined_paths(self.scene, self.query.fleet)):
             clear = search.offer(found.path)
             if done > 0 and not clear:
                 return False
@@ -113,7 +113,7 @@ class AmongObstacles:
     def _checked(self, path: Path, began: float) -> tuple[Found, Segments] | None:
         """The plan of a path, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.planning.clearance
-        shorter = pruned(self.task, path)
+        shorter = pruned(self.query, path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if shorter.cost < self.best else path
         try:
@@ -122,7 +122,7 @@ class AmongObstacles:
             self.refused += 1
             self.complaint = f"{error}. "
             return None
-        room = hand_clearance(scene, self.task.world, segments)
+        room = hand_clearance(scene, self.query.world, segments)
         if room < need:
             self.refused += 1
             self.complaint = (
@@ -149,7 +149,7 @@ class AmongObstacles:
         refused = f"{self.refused} ways were refused: {self.complaint}" if self.refused else ""
         return (
             f"{search.nodes} poses were searched from the start and from the goal with"
-            f" {self.task.fleet.size} pushes, in cells down to {1000 * search.finest:.1f} mm, and none of the ways"
+            f" {self.query.fleet.size} pushes, in cells down to {1000 * search.finest:.1f} mm, and none of the ways"
             f" reached the other end with {1000 * self.scene.planning.clearance:.2f} mm of clearance. {refused}"
             "More time (time_limit, iterations), less clearance or other pushes may help. "
         )

@@ -12,6 +12,7 @@ from ..problem import Scene
 from ..steering.fleet import Fleet
 from ..steering.three_twist import words
 from .path import Path
+from .query import Query
 
 ROUND = 3300  # of the scene's iterations, that a round of the refinement counts as
 
@@ -48,11 +49,7 @@ def refined_paths(scene: Scene, fleet: Fleet) -> Iterator[Found]:
 
     planning = scene.planning
     search = improvements(
-        fleet,
-        scene.start_pose,
-        scene.goal_pose,
-        robust=planning.robust,
-        seed=planning.seed,
+        Query(fleet, scene.start_pose, scene.goal_pose, robust=planning.robust), seed=planning.seed
     )
     began = clock()
     rounds = max(1, planning.iterations // ROUND)

@@ -11,7 +11,6 @@ from ..geometry.pose import Array
 from ..steering.fleet import Fleet
 
 NOTHING = 1e-10  # an amount below this is nothing [rad, m]
-COLUMNS = 7  # of a row of a word: what it costs, then letter and amount of each of its three pieces
 Piece = tuple[int, int, float]
 
 
@@ -74,7 +73,7 @@ class Path:
         return float(total)
 
     def backwards(self, fleet: Fleet, start: Array) -> "Path":
-        """The path of a reversed task (Task.reversed) as one of the task itself."""
+        """The path of a reversed query (Query.reversed) as one of the query itself."""
         return Path.of(
             fleet, start, [(push, 2 - letter, amount) for push, letter, amount in self.pieces[::-1]]
         )
@@ -99,6 +98,9 @@ class Path:
         return found
 
 
-def pieces_of(push: int, row: Array) -> list[Piece]:
-    """The pieces of a word of a push in a row of COLUMNS numbers."""
-    return [(push, int(row[1 + 2 * i]), float(row[2 + 2 * i])) for i in range(3)]
+def pieces_of(push: int, word: np.void) -> list[Piece]:
+    """The pieces of a word of a push, a record of six_words.WORD."""
+    return [
+        (push, letter, amount)
+        for letter, amount in zip(word["letter"].tolist(), word["amount"].tolist(), strict=True)
+    ]

@@ -18,7 +18,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import inner, kernel
+from ..compiled import inner, kernel, shared
 from ..geometry.pose import Array
 
 TURN = 2 * math.pi  # a full turn [rad]
@@ -57,6 +57,9 @@ class _Goal(NamedTuple):
     c: float
     s: float
     scale: float
+
+
+_CAR, _WORD, _GOAL = np.zeros(1, CAR)[0], np.zeros(1, WORD)[0], _Goal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inner
@@ -138,7 +141,7 @@ def _seen(car: Any, start: Array, goal: Array) -> _Goal:
     return _Goal(x, y, theta, math.cos(theta), math.sin(theta), math.hypot(x, y) + 2.0 * car.radius)
 
 
-@inner
+@shared(0.0, _CAR, _GOAL, 0, 0.0, _WORD)
 def _word(car: Any, goal: _Goal, option: int, limit: float, found: Any) -> float:
     """Cost of one of the twelve words, filled in if it leads to the goal for less than a limit; else inf.
 

@@ -6,6 +6,7 @@ from itertools import islice
 import numpy as np
 
 from ...geometry.pose import Array
+from ...planning.query import Query
 from ...planning.refine import improvements
 from ...steering.fleet import Fleet
 from .contact_car import ContactCar
@@ -36,7 +37,7 @@ def next_push(
         np.full((n, 3), np.inf),
         np.where(np.eye(n) > 0, 0.0, switching),
     )
-    *_, best = islice(improvements(fleet, pose, goal, seed=seed), 2)
+    *_, best = islice(improvements(Query(fleet, pose, goal), seed=seed), 2)
     i = int(best.pushes[0])
     weights = dict(zip("LSR", (radii[i], 1.0, radii[i]), strict=True))
     length = sum(weights[x] * float(a) for x, a in zip(best.words[0], best.amounts[0], strict=True))

@@ -7,16 +7,14 @@ Whether a motion keeps the clearance is decided exactly, between its ends includ
 
 from .endpoints import check_endpoints
 from .prune import pruned
-from .scene_task import careful, obstructions, task_of
+from .scene_query import careful, obstructions, query_of
 from .search import Search
-from .task import Task
 
 __all__ = [
     "Search",
-    "Task",
     "careful",
     "check_endpoints",
     "obstructions",
     "pruned",
-    "task_of",
+    "query_of",
 ]

@@ -7,9 +7,9 @@ import numpy as np
 
 from ...geometry.pose import Array
 from ..path import Path
+from ..query import Query
 from .lattice import Lattice, Level, Reach
 from .polish import Chain
-from .task import Task
 from .trees import Trees
 
 FINER = 0.72  # from level to level
@@ -36,8 +36,8 @@ class Search:
         direct: whether such a disc is known to have a path that is hardly longer than the straight one.
     """
 
-    def __init__(self, task: Task, seed: int) -> None:
-        self.task = task
+    def __init__(self, query: Query, seed: int) -> None:
+        self.query = query
         self.best: Path | None = None
         self.work = 0
         self.nodes = 0
@@ -63,21 +63,21 @@ class Search:
         from the start or from the goal, in turns. What they find is polished at once, and the best ways again and
         again.
         """
-        if not self.task.first or not self.task.last:
+        if not self.query.first or not self.query.last:
             return
-        trees = Trees(self.task, self._seed)
+        trees = Trees(self.query, self._seed)
         self.work, self.nodes = trees.work, trees.size
         if trees.path is not None:
             self.best = trees.path
             yield self.best
             self._add(trees.path)
         yield self.best
-        reaches = [Reach(self.task)]
+        reaches = [Reach(self.query)]
         self.disc, self.closed, self.direct = reaches[0].radius, not reaches[0].open, reaches[0].direct
         if self.closed:
             return
         families = [self._levels(reaches, True)]
-        if self.task.fleet.size > 1:
+        if self.query.fleet.size > 1:
             families.append(self._levels(reaches, False))
         turn = 0
         while True:
@@ -101,27 +101,27 @@ class Search:
         """
         k = 0
         while True:
-            level = level_of(self.task, reaches[0], k, changing)
+            level = level_of(self.query, reaches[0], k, changing)
             self.finest = min(self.finest, level.cell)
             pair: list[Lattice] = []
             while not any(lattice.done or lattice.size > MOST for lattice in pair):
                 for back in (0, 1):
                     if len(pair) == back:
                         # The path back is estimated only when it is needed: the first path often comes sooner.
-                        task = self.task.reversed if back else self.task
+                        query = self.query.reversed if back else self.query
                         if len(reaches) == back:
-                            reaches.append(Reach(task))
-                        pair.append(Lattice(task, reaches[back], level, self.cost * SLACK, self._rng))
+                            reaches.append(Reach(query))
+                        pair.append(Lattice(query, reaches[back], level, self.cost * SLACK, self._rng))
                     lattice = pair[back]
                     found = self._advance(lattice)
-                    yield found.backwards(self.task.fleet, self.task.start) if found and back else found
+                    yield found.backwards(self.query.fleet, self.query.start) if found and back else found
                     if lattice.done:
                         break
             k += 1
 
     def _advance(self, lattice: Lattice) -> Path | None:
         seen, expanded = lattice.size, lattice.expanded
-        better = lattice.advance(1 + EXPANSIONS // self.task.fleet.size, self.cost * SLACK)
+        better = lattice.advance(1 + EXPANSIONS // self.query.fleet.size, self.cost * SLACK)
         self.work += lattice.expanded - expanded
         self.nodes += lattice.size - seen
         if self._drawn is None or self._drawn.size < lattice.size <= DRAWN:
@@ -129,7 +129,7 @@ class Search:
         return lattice.path if better else None
 
     def _add(self, path: Path) -> None:
-        chain = Chain(self.task, path, int(self._rng.integers(1 << 60)))
+        chain = Chain(self.query, path, int(self._rng.integers(1 << 60)))
         if chain.legs:
             chain.improve(MOVES)
             self.work += MOVES
@@ -161,7 +161,7 @@ class Search:
         if not path.pieces:
             return False
         pushes, letters, amounts = (np.array(column) for column in zip(*path.pieces, strict=True))
-        if not path_clear(self.task.arrays, path.start, pushes, letters, amounts):
+        if not path_clear(self.query.arrays, path.start, pushes, letters, amounts):
             return False
         if path.cost < self.cost:
             self.best = path
@@ -173,21 +173,21 @@ class Search:
         if self._drawn is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
         edges, starts = self._drawn.edges(DRAWN)
-        path = Path(self._drawn.task.fleet, self.task.start, ())
+        path = Path(self._drawn.query.fleet, self.query.start, ())
         return np.array([path.step(int(a), int(letter), x) for a, letter, x, _ in edges]).reshape(
             -1, 3
         ), starts
 
 
-def level_of(task: Task, reach: Reach, k: int, changing: bool) -> Level:
+def level_of(query: Query, reach: Reach, k: int, changing: bool) -> Level:
     """The k-th lattice: cells from a third of the object down, steps that leave a cell, turns that change its layer."""
-    box = task.extent
-    size = task.bodies[0].outline.size
+    box = query.extent
+    size = query.bodies[0].outline.size
     largest = max(
         0.75 * float(np.sqrt(reach.radius * size)),
         float(np.sqrt((box.xmax - box.xmin) * (box.ymax - box.ymin))) / 60,
     )
     cell = largest * FINER**k
     step = 1.5 * cell
-    angles = int(np.clip(1.5 * 2 * np.pi * float(np.median(task.fleet.radius)) / step, *ANGLES))
+    angles = int(np.clip(1.5 * 2 * np.pi * float(np.median(query.fleet.radius)) / step, *ANGLES))
     return Level(cell, angles, step, changing, 1.5 if k < 2 else 1.0)

@@ -4,24 +4,24 @@ import numpy as np
 
 from ...geometry import compose, exp
 from ...geometry.pose import Array
-from .problem import Candidate, Query
+from .problem import Candidate, Sequences
 
 MOST_SUMS = 3_000_000  # sums of one table cell and a cost to go, per pool: bounds the size of the table
 MOST_CELLS = 10_000  # of the table of cars that are not Dubins cars
 TAILS = 16  # pairs of pushes that longer sequences may end with
 MOST_TRIPLES = 800  # sequences of three pushes solved per round after a random first arc
 ARC_SEEDS = 24
-Way = tuple[float, tuple[int, ...], tuple[int, ...]]  # cost, pushes, poses of the pool
+Choice = tuple[float, tuple[int, ...], tuple[int, ...]]  # cost, pushes, poses of the pool
 QUOTAS = {2: 16, 3: 20, 4: 14}  # seeds by number of legs
 
 
-def sample_poses(query: Query, rng: np.random.Generator, count: int, near: list[Array]) -> Array:
+def sample_poses(sequences: Sequences, rng: np.random.Generator, count: int, near: list[Array]) -> Array:
     """Poses where switching may pay, shape (count, 3).
 
     Half of them around start and goal, the others one or two arcs away from the start or before the goal (good plans
     have few arcs), and some near the switch poses `near` (n, 3) of plans that are good already.
     """
-    fleet, start, goal = query.fleet, query.start, query.goal
+    fleet, start, goal = sequences.fleet, sequences.start, sequences.goal
     reach = 1.6 * float(np.median(fleet.radius))
     local = count // 4 if near else 0
     driven = (count - local) // 2
@@ -34,7 +34,7 @@ def sample_poses(query: Query, rng: np.random.Generator, count: int, near: list[
         pushes = rng.integers(fleet.size, size=size)
         poses = np.broadcast_to(origin, (size, 3))
         for _ in range(2):
-            poses = compose(poses, exp(sense * _arcs(query, rng, pushes)))
+            poses = compose(poses, exp(sense * _arcs(sequences, rng, pushes)))
         parts.append(poses)
     if local:
         centres = np.concatenate(near)[rng.integers(sum(map(len, near)), size=local)]
@@ -43,15 +43,15 @@ def sample_poses(query: Query, rng: np.random.Generator, count: int, near: list[
     return np.concatenate(parts)
 
 
-def pool_seeds(query: Query, poses: Array, legs: int) -> list[Candidate]:
+def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]:
     """The best sequences of two to `legs` pushes, at most four, whose switch poses are in the pool; cheapest first."""
-    fleet = query.fleet
+    fleet = sequences.fleet
     k, sigma = fleet.size, fleet.switching
     if k < 2 or legs < 2:
         return []
-    first = query.table(query.start[None], poses)[:, 0, :]  # (k, m)
-    last = query.table(poses, query.goal[None])[:, :, 0]
-    found: list[Way] = []
+    first = sequences.table(sequences.start[None], poses)[:, 0, :]  # (k, m)
+    last = sequences.table(poses, sequences.goal[None])[:, :, 0]
+    found: list[Choice] = []
     pairs = _pairs(sigma)
     for i, j in pairs:
         sums = first[i] + last[j]
@@ -59,17 +59,17 @@ def pool_seeds(query: Query, poses: Array, legs: int) -> list[Candidate]:
         found.append((float(sums[m]) + sigma[i, j], (i, j), (m,)))
     chosen = _keep(found, 2)
     if legs > 2:
-        inner = _promising(first.min(axis=0), last.min(axis=0), k, query.flat)
+        inner = _promising(first.min(axis=0), last.min(axis=0), k, sequences.flat)
         first, last = first[:, inner], last[:, inner]
-        table = query.table(poses[inner], poses[inner])
+        table = sequences.table(poses[inner], poses[inner])
         to_go = []  # of tails (l, n): cost from each pose, and the pose where l ends
         for a, b in pairs:
             sums = table[a] + last[b]
             ends = np.argmin(sums, axis=1)
             to_go.append(((a, b), np.take_along_axis(sums, ends[:, None], 1)[:, 0] + sigma[a, b], ends))
         to_go.sort(key=lambda tail: float(np.min(tail[1] + first.min(axis=0))))
-        three: list[Way] = []
-        four: list[Way] = []
+        three: list[Choice] = []
+        four: list[Choice] = []
         for (a, b), cost, ends in to_go[:TAILS]:
             for j in range(k):
                 if j == a or not np.isfinite(sigma[j, a]):
@@ -89,13 +89,15 @@ def pool_seeds(query: Query, poses: Array, legs: int) -> list[Candidate]:
                     four.append((float(both[m]) + sigma[i, j], (i, j, a, b), via))
         chosen += _keep(three, 3) + _keep(four, 4)
     seeds = [
-        Candidate(cost, np.array(pushes), np.concatenate([[query.start], poses[list(via)], [query.goal]]))
+        Candidate(
+            cost, np.array(pushes), np.concatenate([[sequences.start], poses[list(via)], [sequences.goal]])
+        )
         for cost, pushes, via in chosen
     ]
     return sorted(seeds, key=lambda seed: seed.cost)
 
 
-def arc_seeds(query: Query, rng: np.random.Generator, plain: bool) -> list[Candidate]:
+def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> list[Candidate]:
     """Plans of three arcs, of one push each (if `plain`: they are always the same), and such plans after a random first
     arc; the cheapest of each sequence.
 
@@ -103,18 +105,22 @@ def arc_seeds(query: Query, rng: np.random.Generator, plain: bool) -> list[Candi
     """
     from .three_arcs import three_arcs
 
-    fleet, k = query.fleet, query.fleet.size
+    fleet, k = sequences.fleet, sequences.fleet.size
     switching = np.ascontiguousarray(fleet.switching, dtype=float)
     prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
     pushes = rng.integers(k, size=prefixes)
-    starts = compose(query.start, exp(_arcs(query, rng, pushes)))
+    starts = compose(sequences.start, exp(_arcs(sequences, rng, pushes)))
     found: list[tuple[float, tuple[int, ...], Array]] = []
     costs, poses = np.empty(k**3), np.empty((k**3, 2, 3))
     for prefix in range(-1 if plain else 0, prefixes):
         first: tuple[int, ...] = () if prefix < 0 else (int(pushes[prefix]),)
-        start = query.start if prefix < 0 else starts[prefix]
-        before = 0.0 if prefix < 0 else query.candidate(pushes[[prefix]], np.array([query.start, start])).cost
-        three_arcs(query.cars, switching, start, query.goal, costs, poses)
+        start = sequences.start if prefix < 0 else starts[prefix]
+        before = (
+            0.0
+            if prefix < 0
+            else sequences.candidate(pushes[[prefix]], np.array([sequences.start, start])).cost
+        )
+        three_arcs(sequences.cars, switching, start, sequences.goal, costs, poses)
         for triple in np.argsort(costs)[: ARC_SEEDS if prefix < 0 else 4]:
             i, j, h = triple // (k * k), triple // k % k, triple % k
             cost = before + costs[triple] + (fleet.switching[first[0], i] if first else 0.0)
@@ -124,15 +130,17 @@ def arc_seeds(query: Query, rng: np.random.Generator, plain: bool) -> list[Candi
     found.sort(key=lambda plan: plan[0])
     seeds: dict[tuple[int, ...], Candidate] = {}
     for _, sequence, via in found[: 2 * ARC_SEEDS]:
-        seed = query.merged(np.array(sequence), np.concatenate([[query.start], via, [query.goal]]))
+        seed = sequences.merged(
+            np.array(sequence), np.concatenate([[sequences.start], via, [sequences.goal]])
+        )
         if seed.key not in seeds:
             seeds[seed.key] = seed
     return list(seeds.values())[:ARC_SEEDS]
 
 
-def _arcs(query: Query, rng: np.random.Generator, pushes: np.ndarray) -> Array:
+def _arcs(sequences: Sequences, rng: np.random.Generator, pushes: np.ndarray) -> Array:
     """One random arc of each push, as a body displacement's logarithm, shape (n, 3)."""
-    fleet, n = query.fleet, len(pushes)
+    fleet, n = sequences.fleet, len(pushes)
     motion = rng.integers(3, size=n)
     turn = np.where(motion == 0, 1.0, -1.0) * rng.exponential(0.6, n)
     centre = np.where((motion == 0)[:, None], fleet.left[pushes], fleet.right[pushes])
@@ -162,5 +170,5 @@ def _promising(first: Array, last: Array, k: int, flat: bool) -> np.ndarray:
     return np.unique(picked)
 
 
-def _keep(found: list[Way], legs: int) -> list[Way]:
+def _keep(found: list[Choice], legs: int) -> list[Choice]:
     return sorted(found)[: QUOTAS[legs]]

@@ -1,17 +1,18 @@
-"""A query as the refinement sees it: the fleet as records, the two ends, what a sequence of pushes costs."""
+"""Sequences of pushes with their switch poses: what they cost, and how they are moved to where they cost less."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from ...errors import InputError
 from ...geometry.pose import Array
 from ...steering import dubins
 from ...steering.fleet import Fleet
 from ...steering.six_words import WORD, Records, chain_cost
+from ..query import Query, offsets
 from .descent import Work, descend
 
-OFFSET, OFFSET_ANGLE = 2e-4, np.deg2rad(0.2)  # of the switch poses, for the cost of replanning [m, rad]
 SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
@@ -35,8 +36,15 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Query:
-    """From a start to a goal with a fleet; legs of plans with several pushes are at least `least` long [m]."""
+class Sequences:
+    """What sequences of pushes from the start to the goal of a query cost on an empty table.
+
+    Attributes:
+        fleet, start, goal: of the query.
+        least: that the flat path of each leg of a plan with several pushes is long [m].
+        cars: the fleet as records; changes: its switching costs; flat: whether all are Dubins cars.
+        offsets: displacements of the switch poses for the cost of replanning, shape (16, 3).
+    """
 
     fleet: Fleet
     start: Array
@@ -48,13 +56,15 @@ class Query:
     flat: bool
 
     @classmethod
-    def of(cls, fleet: Fleet, start: Array, goal: Array, least: float) -> "Query":
-        around = np.arange(8) * (np.pi / 4)
-        ring = np.column_stack([OFFSET * np.cos(around), OFFSET * np.sin(around)])
-        signs = np.repeat([OFFSET_ANGLE, -OFFSET_ANGLE], 8)
-        offsets = np.column_stack([np.tile(ring, (2, 1)), signs])
-        changes = fleet.switching.tolist()
-        return cls(fleet, start, goal, least, fleet.cars, changes, offsets, fleet.is_dubins)
+    def of(cls, query: Query, least: float) -> "Sequences":
+        """Raises InputError if the least length is negative."""
+        if not least >= 0:
+            raise InputError("the least length of a leg is 0 or more", value=least)
+        fleet = query.fleet
+        return cls(
+            fleet, query.start, query.goal, float(least), fleet.cars, fleet.switching.tolist(), offsets(),
+            fleet.is_dubins,
+        )  # fmt: skip
 
     def switching(self, pushes: np.ndarray) -> float:
         sequence = pushes.tolist()
@@ -108,7 +118,7 @@ class Query:
         return Candidate(best + self.switching(pushes), pushes, poses)
 
     def replanning(self, found: Candidate) -> float:
-        """Mean cost when every leg but the first starts OFFSET and OFFSET_ANGLE off, over sixteen fixed displacements.
+        """Mean cost when every leg but the first starts off its switch pose, over sixteen fixed displacements.
 
         The leg is planned again from there to where it was to end.
         """

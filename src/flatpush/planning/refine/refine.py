@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ...steering.fleet import Fleet
+from ..query import Query
 from .pool import arc_seeds, pool_seeds, sample_poses
-from .problem import Candidate, Query
+from .problem import Candidate, Sequences
 
 ROUNDS = 3
 POOL = 1600  # poses of a round's pool, for Dubins cars; a third of it for others, whose tables take longer
@@ -55,13 +55,10 @@ class Refined:
 
 
 def refine(
-    fleet: Fleet,
-    start: ArrayLike,
-    goal: ArrayLike,
+    query: Query,
     seeds: Iterable[tuple[ArrayLike, ArrayLike]] = (),
     *,
     rounds: int = ROUNDS,
-    robust: bool = False,
     seed: int = 0,
     least: float = LEAST,
     legs: int = 4,
@@ -69,17 +66,14 @@ def refine(
     """The best plan found in a number of rounds; see improvements, whose last answer it is."""
     if rounds < 0:
         raise InputError("the number of rounds is 0 or more", value=rounds)
-    found = improvements(fleet, start, goal, seeds, robust=robust, seed=seed, least=least, legs=legs)
+    found = improvements(query, seeds, seed=seed, least=least, legs=legs)
     return list(islice(found, rounds + 1))[-1]
 
 
 def improvements(
-    fleet: Fleet,
-    start: ArrayLike,
-    goal: ArrayLike,
+    query: Query,
     seeds: Iterable[tuple[ArrayLike, ArrayLike]] = (),
     *,
-    robust: bool = False,
     seed: int = 0,
     least: float = LEAST,
     legs: int = 4,
@@ -87,64 +81,58 @@ def improvements(
     """The best plan so far, at once from the seeds and then after every round; endless, and never worse than before.
 
     Args:
-        fleet: the cars of the pushes and what their motions and changes cost; an infinite cost forbids a change.
-        start, goal: poses X_WO, shape (3,) [m, m, rad].
+        query: start, goal and fleet; a robust one minimises replanning_cost instead of cost. Its world is left out.
         seeds: plans to start from: indices of pushes (n,), and poses at the start, at every switch and at the goal
             (n + 1, 3), the ends being replaced by start and goal. More are found without being asked for.
-        robust: minimise replanning_cost instead of cost.
         seed: of everything random.
         least: shortest flat path of a leg in a plan of several pushes [m]; searches love useless pushes.
         legs: most pushes of the sequences that are tried on their own account, up to 4.
 
     Raises:
-        InputError: for poses that are not finite or of another shape, seeds that do not fit them or the fleet, an
-            empty fleet, a negative `least`.
+        InputError: for seeds that do not fit the query, or a negative `least`.
     """
-    X, Y = _pose(start, "the start"), _pose(goal, "the goal")
-    if fleet.size == 0:
-        raise InputError("there is at least one push", value=0)
-    if not least >= 0:
-        raise InputError("the least length of a leg is 0 or more", value=least)
-    query = Query.of(fleet, X, Y, float(least))
-    candidates = [_seed(query, *given) for given in seeds]
-    return _search(query, candidates, robust, np.random.default_rng(seed), min(legs, 4))
+    sequences = Sequences.of(query, least)
+    candidates = [_seed(sequences, *given) for given in seeds]
+    return _search(sequences, candidates, query.robust, np.random.default_rng(seed), min(legs, 4))
 
 
 def _search(
-    query: Query, seeds: list[Candidate], robust: bool, rng: np.random.Generator, legs: int
+    sequences: Sequences, seeds: list[Candidate], robust: bool, rng: np.random.Generator, legs: int
 ) -> Iterator[Refined]:
-    direct = query.direct()
+    direct = sequences.direct()
     before = min([direct, *seeds], key=_cost)
     known: dict[tuple[int, ...], Candidate] = {}
     for found in (direct, *seeds):
         _remember(known, found)
-    best = min(known.values(), key=query.replanning if robust else _cost)
+    best = min(known.values(), key=sequences.replanning if robust else _cost)
     settled: set[float] = set()
     done = 0
     while True:
-        yield _answer(query, best, before.cost, done)
+        yield _answer(sequences, best, before.cost, done)
         ranked = sorted(known.values(), key=_cost)
-        if query.fleet.size > 1 or seeds:
+        if sequences.fleet.size > 1 or seeds:
             near = [found.poses[1:-1] for found in ranked[:6] if len(found.pushes) > 1]
-            size = POOL if query.flat else POOL // 3
-            starts = pool_seeds(query, sample_poses(query, rng, size, near), legs)
-            starts += arc_seeds(query, rng, done == 0)
-            starts += _variations(query, ranked, rng)
+            size = POOL if sequences.flat else POOL // 3
+            starts = pool_seeds(sequences, sample_poses(sequences, rng, size, near), legs)
+            starts += arc_seeds(sequences, rng, done == 0)
+            starts += _variations(sequences, ranked, rng)
             if done == 0:
-                starts += [shorter for s in seeds for shorter in (s, *_without(query, s))]
-            _downhill(query, starts, known)
+                starts += [shorter for s in seeds for shorter in (s, *_without(sequences, s))]
+            _downhill(sequences, starts, known)
         ranked = sorted(known.values(), key=_cost)
         known = {found.key: found for found in ranked[:KEPT]}
         if robust:
-            best = _settled(query, best, ranked, settled)
+            best = _settled(sequences, best, ranked, settled)
         else:
             best = min([best, ranked[0]], key=_cost)
         done += 1
 
 
-def _settled(query: Query, best: Candidate, ranked: list[Candidate], settled: set[float]) -> Candidate:
+def _settled(
+    sequences: Sequences, best: Candidate, ranked: list[Candidate], settled: set[float]
+) -> Candidate:
     """The best by the cost of replanning, after some of the cheapest plans have been moved for that."""
-    value = query.replanning(best)
+    value = sequences.replanning(best)
     count = 0
     for found in ranked:
         if found.cost >= value or count == SETTLED:
@@ -153,19 +141,19 @@ def _settled(query: Query, best: Candidate, ranked: list[Candidate], settled: se
             continue
         settled.add(found.cost)
         count += 1
-        moved = query.settle(found)
-        replanned = query.replanning(moved)
+        moved = sequences.settle(found)
+        replanned = sequences.replanning(moved)
         if np.isfinite(moved.cost) and replanned < value:
             best, value = moved, replanned
     return best
 
 
-def _answer(query: Query, found: Candidate, before: float, rounds: int) -> Refined:
-    _, words = query.chain(found.pushes, found.poses)
+def _answer(sequences: Sequences, found: Candidate, before: float, rounds: int) -> Refined:
+    _, words = sequences.chain(found.pushes, found.poses)
     return Refined(
         found.cost,
         before,
-        query.replanning(found),
+        sequences.replanning(found),
         found.pushes,
         found.poses,
         tuple("".join("LSR"[letter] for letter in word) for word in words["letter"].tolist()),
@@ -178,19 +166,19 @@ def _cost(found: Candidate) -> float:
     return found.cost
 
 
-def _downhill(query: Query, starts: list[Candidate], known: dict[tuple[int, ...], Candidate]) -> None:
+def _downhill(sequences: Sequences, starts: list[Candidate], known: dict[tuple[int, ...], Candidate]) -> None:
     """A few steps for all, the whole way for the most promising; the best of every sequence is remembered."""
-    tried = [query.descend(s, 1, 25) for s in starts if len(s.pushes) > 1]
+    tried = [sequences.descend(s, 1, 25) for s in starts if len(s.pushes) > 1]
     tried.sort(key=_cost)
     finished, seen = 0, set[int]()
     for found in tried:
         mark = round(found.cost * 1e7) if np.isfinite(found.cost) else 0
         if finished < FINISHED and mark and mark not in seen:
             seen.add(mark)
-            found = query.descend(found, 6, 80)
+            found = sequences.descend(found, 6, 80)
             finished += 1
-            for shorter in _without(query, found):
-                _remember(known, query.descend(shorter, 2, 40) if len(shorter.pushes) > 1 else shorter)
+            for shorter in _without(sequences, found):
+                _remember(known, sequences.descend(shorter, 2, 40) if len(shorter.pushes) > 1 else shorter)
         _remember(known, found)
 
 
@@ -199,21 +187,21 @@ def _remember(known: dict[tuple[int, ...], Candidate], found: Candidate) -> None
         known[found.key] = found
 
 
-def _without(query: Query, found: Candidate) -> list[Candidate]:
+def _without(sequences: Sequences, found: Candidate) -> list[Candidate]:
     """The plan without one of its legs, where that is not much dearer; equal neighbours become one leg."""
     shorter = []
     for i in range(len(found.pushes) if len(found.pushes) > 1 else 0):
         pushes = np.delete(found.pushes, i)
         for gone in {max(i, 1), min(i + 1, len(found.pushes) - 1)}:
-            merged = query.merged(pushes, np.delete(found.poses, gone, axis=0))
+            merged = sequences.merged(pushes, np.delete(found.poses, gone, axis=0))
             if merged.cost < 1.2 * found.cost:
                 shorter.append(merged)
     return shorter
 
 
-def _variations(query: Query, ranked: list[Candidate], rng: np.random.Generator) -> list[Candidate]:
+def _variations(sequences: Sequences, ranked: list[Candidate], rng: np.random.Generator) -> list[Candidate]:
     """The best plans with their switch poses shaken, one push replaced, or one put in between."""
-    fleet, radius = query.fleet, float(np.median(query.fleet.radius))
+    fleet, radius = sequences.fleet, float(np.median(sequences.fleet.radius))
     found = []
     for plan in ranked[:SHAKEN]:
         n = len(plan.pushes)
@@ -228,32 +216,27 @@ def _variations(query: Query, ranked: list[Candidate], rng: np.random.Generator)
         pushes = plan.pushes.copy()
         pushes[rng.integers(n)] = rng.integers(fleet.size)
         if n > 1:
-            found.append(query.merged(pushes, plan.poses))
+            found.append(sequences.merged(pushes, plan.poses))
         if n < 8:
             i, push = int(rng.integers(n + 1)), int(rng.integers(fleet.size))
             at = plan.poses[i] + 0.15 * np.array([radius, radius, 1.0]) * rng.normal(size=3)
             poses = np.insert(plan.poses, min(max(i, 1), n), at, axis=0)
-            found.append(query.merged(np.insert(plan.pushes, i, push), poses))
-    return [plan for plan in found if np.isfinite(query.switching(plan.pushes))]
+            found.append(sequences.merged(np.insert(plan.pushes, i, push), poses))
+    return [plan for plan in found if np.isfinite(sequences.switching(plan.pushes))]
 
 
-def _seed(query: Query, pushes: ArrayLike, poses: ArrayLike) -> Candidate:
+def _seed(sequences: Sequences, pushes: ArrayLike, poses: ArrayLike) -> Candidate:
     sequence, X = np.asarray(pushes), np.array(poses, dtype=float)
     if sequence.ndim != 1 or len(sequence) == 0 or not np.issubdtype(sequence.dtype, np.integer):
         raise InputError("the pushes of a seed are one or more indices", value=pushes)
-    if np.any(sequence < 0) or np.any(sequence >= query.fleet.size):
-        raise InputError(f"the pushes of a seed are indices from 0 to {query.fleet.size - 1}", value=pushes)
+    if np.any(sequence < 0) or np.any(sequence >= sequences.fleet.size):
+        raise InputError(
+            f"the pushes of a seed are indices from 0 to {sequences.fleet.size - 1}", value=pushes
+        )
     if X.shape != (len(sequence) + 1, 3) or not np.isfinite(X).all():
         raise InputError("a seed of n pushes has n + 1 finite poses", value=poses)
-    X[0], X[-1] = query.start, query.goal
-    merged = query.merged(sequence.astype(np.int64), X)
+    X[0], X[-1] = sequences.start, sequences.goal
+    merged = sequences.merged(sequence.astype(np.int64), X)
     if len(merged.pushes) > 12:
         raise InputError("a seed has at most 12 pushes", value=len(merged.pushes))
     return merged
-
-
-def _pose(value: ArrayLike, name: str) -> Array:
-    pose = np.asarray(value, dtype=float)
-    if pose.shape != (3,) or not np.isfinite(pose).all():
-        raise InputError(f"{name} is one finite pose (x, y, θ)", value=value)
-    return pose.copy()

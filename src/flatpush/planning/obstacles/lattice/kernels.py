@@ -10,23 +10,9 @@ from ....geometry.collision.body import POINT, BodyArrays
 from ....geometry.collision.kernels import still_gap
 from ....geometry.collision.world import Box, WorldArrays
 from ....geometry.pose import Array
-from ..kernels import (
-    COLUMNS,
-    FULL_TURN,
-    LEFT,
-    RIGHT,
-    STRAIGHT,
-    WORDS,
-    changes,
-    connect,
-    copy,
-    drive,
-    free,
-    piece_clear,
-    put,
-)
-from ..kernels import COST as WORD_COST
-from ..task import TaskArrays
+from ....steering.six_words import LEFT, MOST_WORDS, RIGHT, STRAIGHT, TURN, WORD, Records, drive
+from ...query_arrays import QueryArrays
+from ..kernels import changes, connect, free, piece_clear, put
 
 X, Y, THETA, COST, LETTER, AMOUNT = range(6)  # columns of the nodes
 PARENT, PUSH, PLACE = range(3)  # columns of the links: PLACE is in the table
@@ -43,7 +29,7 @@ class Queue(NamedTuple):
         nodes: rows X … AMOUNT; links: rows PARENT, PUSH, PLACE.
         table: hash table of cells, rows (CODE, best NODE), empty at -1, its length a power of two.
         keys, heap: of the priority queue; counts: nodes, entries of the queue, nodes expanded.
-        best: cost of the best path to the goal, its last node, its push; shot: its last word.
+        best: cost of the best path to the goal, its last node, its push; shot: its last word, of WORD, shape (1,).
     """
 
     nodes: Array
@@ -53,7 +39,7 @@ class Queue(NamedTuple):
     heap: np.ndarray
     counts: np.ndarray
     best: Array
-    shot: Array
+    shot: Records
 
 
 class Steps(NamedTuple):
@@ -175,12 +161,12 @@ def _down(key: Array, at: np.ndarray, size: int) -> None:
 
 
 @kernel()
-def expand(T: TaskArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, budget: int) -> int:
+def expand(T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, budget: int) -> int:
     """Expands up to a number of nodes; returns why it stopped: SPENT, DONE or FULL."""
     nodes, links, table, counts, best = queue.nodes, queue.links, queue.table, queue.counts, queue.best
     keys, heap, cell, angles = queue.keys, queue.heap, steps.cell, steps.angles
     k, size, queued = len(T.cars), counts[0], counts[1]
-    pose, here, rows = np.empty(3), np.empty(3), np.empty((WORDS, COLUMNS))
+    pose, here, words = np.empty(3), np.empty(3), np.empty(MOST_WORDS, WORD)
     status = SPENT
     for _ in range(budget):
         if queued == 0:
@@ -206,32 +192,28 @@ def expand(T: TaskArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, b
                 continue
             # Straight to the goal.
             if g + extra + _least(T, b, pose, goal) < best[0] and T.last[b]:
-                found = connect(T, b, pose, goal, best[0] - g - extra, steps.tries, rows, here)
+                found = connect(T, b, pose, goal, best[0] - g - extra, steps.tries, words, here)
                 if found >= 0:
-                    best[0], best[1], best[2] = g + extra + rows[found, WORD_COST], node, b
-                    copy(rows[found], queue.shot)
+                    best[0], best[1], best[2] = g + extra + words[found].cost, node, b
+                    queue.shot[0] = words[found]
             for letter in range(3):
                 amount = steps.step if letter == STRAIGHT else steps.step / T.cars[b].radius
-                law = T.laws[b, letter]
-                cost = g + extra + law.rate * amount
-                if law.speed != np.inf:
+                way, speed = T.cars[b].rate[letter] * amount, T.cars[b].speed[letter]
+                cost = g + extra + way
+                if speed != np.inf:
                     # At full speed; what it takes to start and stop counts where the motion changes.
                     same = b == a and nodes[node, LETTER] == letter
-                    cost = (
-                        g
-                        + extra
-                        + law.rate * amount / law.speed
-                        + (0.0 if same else law.speed / law.acceleration)
-                    )
+                    ramp = 0.0 if same else speed / T.cars[b].acceleration[letter]
+                    cost = g + extra + way / speed + ramp
                 if cost >= best[0]:
                     continue
                 put(pose, here)
-                drive(T, b, letter, amount, here)
+                drive(T.cars[b], letter, amount, here)
                 i, m = (
                     np.int64(math.floor((here[0] - steps.x) / cell)),
                     np.int64(math.floor((here[1] - steps.y) / cell)),
                 )
-                h = int(((here[2] - steps.theta) % FULL_TURN) / FULL_TURN * angles) % angles
+                h = int(((here[2] - steps.theta) % TURN) / TURN * angles) % angles
                 code = ((np.int64(b) * angles + h) * MANY + (m + MANY // 2)) * MANY + (i + MANY // 2)
                 at = _slot(table, code)
                 old = table[at, NODE]
@@ -287,14 +269,14 @@ def _rest(rest: Rest, pose: Array) -> float:
 
 
 @inner
-def _least(T: TaskArrays, b: int, pose: Array, goal: Array) -> float:
+def _least(T: QueryArrays, b: int, pose: Array, goal: Array) -> float:
     """What push b costs at least from pose to goal: the path of the midpoint of its centres."""
-    car, law = T.cars[b], T.laws[b]
+    car = T.cars[b]
     fx, fy = 0.5 * (car.left_x + car.right_x), 0.5 * (car.left_y + car.right_y)
     c, s, d, t = math.cos(pose[2]), math.sin(pose[2]), math.cos(goal[2]), math.sin(goal[2])
     x = goal[0] + d * fx - t * fy - pose[0] - c * fx + s * fy
     y = goal[1] + t * fx + d * fy - pose[1] - s * fx - c * fy
-    rate = min(law[STRAIGHT].rate, min(law[LEFT].rate, law[RIGHT].rate) / car.radius)
-    if law[STRAIGHT].speed != np.inf:
-        rate = rate / max(law[LEFT].speed, max(law[STRAIGHT].speed, law[RIGHT].speed))
+    rate = min(car.rate[STRAIGHT], min(car.rate[LEFT], car.rate[RIGHT]) / car.radius)
+    if car.speed[STRAIGHT] != np.inf:
+        rate = rate / max(car.speed[LEFT], max(car.speed[STRAIGHT], car.speed[RIGHT]))
     return rate * math.sqrt(x * x + y * y)

@@ -7,8 +7,8 @@ import numpy as np
 
 from ....geometry import transform
 from ....geometry.pose import Array
-from ...path import COLUMNS, Path, pieces_of
-from ..task import Task
+from ...path import Path, pieces_of
+from ...query import Query
 
 DETOUR = 1.05
 GRID_CELLS = 6_000  # of the grid over which distances to the goal are known, at most
@@ -46,28 +46,28 @@ class Reach:
         direct: whether that way is hardly longer than the straight one.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, query: Query) -> None:
         from .kernels import distances
 
-        self.point, self.radius = largest_disc(task)
-        ends = np.array([transform(X, self.point) for X in (task.start, task.goal)])
-        box = task.extent
+        self.point, self.radius = largest_disc(query)
+        ends = np.array([transform(X, self.point) for X in (query.start, query.goal)])
+        box = query.extent
         size = np.array([box.xmax - box.xmin, box.ymax - box.ymin])
         cell = max(0.35 * self.radius, float(np.sqrt(np.prod(size) / GRID_CELLS)))
         self.nx, self.ny = (int(n) + 1 for n in size / cell)
         self.cell, self.corner = cell, np.array(box[:2])
         self.far = distances(
-            task.world.arrays, self.radius, box, cell, self.nx, self.ny, ends[1], task.clearance
+            query.world.arrays, self.radius, box, cell, self.nx, self.ny, ends[1], query.clearance
         )
         at = np.clip(((ends[0] - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
         way = float(self.far[at[1] * self.nx + at[0]])
         self.open = bool(np.isfinite(way))
         self.direct = way <= DETOUR * float(np.hypot(*(ends[1] - ends[0]))) + 2 * cell
         rates = []
-        for a in range(task.fleet.size):
-            laws = np.where(np.isfinite(task.fleet.speeds[a]), task.fleet.speeds[a], 1.0)
-            left, straight, right = task.fleet.rates[a] / laws
-            arms = [np.hypot(*(self.point - c)) for c in (task.fleet.left[a], task.fleet.right[a])]
+        for a in range(query.fleet.size):
+            laws = np.where(np.isfinite(query.fleet.speeds[a]), query.fleet.speeds[a], 1.0)
+            left, straight, right = query.fleet.rates[a] / laws
+            arms = [np.hypot(*(self.point - c)) for c in (query.fleet.left[a], query.fleet.right[a])]
             rates += [left / max(arms[0], 1e-12), straight, right / max(arms[1], 1e-12)]
         self.per_metre = float(min(rates))
 
@@ -90,25 +90,26 @@ class Lattice:
     """
 
     def __init__(
-        self, task: Task, reach: Reach, level: Level, bound: float, rng: np.random.Generator,
+        self, query: Query, reach: Reach, level: Level, bound: float, rng: np.random.Generator,
         pushes: list[int] | None = None,
     ) -> None:  # fmt: skip
+        from ....steering.six_words import WORD
         from .kernels import Queue, Steps
 
-        self.task = task
+        self.query = query
         shift = rng.uniform(0, 1, 3) * [level.cell, level.cell, 2 * np.pi / level.angles]
-        x, y, theta = (task.start - shift).tolist()
+        x, y, theta = (query.start - shift).tolist()
         self.steps = Steps(x, y, theta, level.cell, level.angles, level.step, TRIES, level.changing)
         self.rest = reach.rest(level.weight)
         self.queue = Queue(
             np.empty((ROOM, 6)), np.empty((ROOM, 3), np.int64), np.full((2 * ROOM, 2), -1), np.empty(ROOM),
-            np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound, -1.0, -1.0]), np.zeros(COLUMNS),
+            np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound, -1.0, -1.0]), np.zeros(1, WORD),
         )  # fmt: skip
         self.done = False
         q = self.queue
-        for a in task.first if pushes is None else pushes:
+        for a in query.first if pushes is None else pushes:
             n = self.size
-            q.nodes[n] = [*task.start, 0.0, -1.0, 0.0]
+            q.nodes[n] = [*query.start, 0.0, -1.0, 0.0]
             q.links[n] = [-1, a, n]
             # A root has a place of its own in the table, under a code that no cell has.
             q.table[n] = [-2 - n, n]
@@ -134,7 +135,7 @@ class Lattice:
         left = budget
         while left > 0:
             expanded = self.expanded
-            status = expand(self.task.arrays, self.queue, self.steps, self.rest, self.task.goal, left)
+            status = expand(self.query.arrays, self.queue, self.steps, self.rest, self.query.goal, left)
             if status == FULL:
                 self._grow()
                 left -= self.expanded - expanded
@@ -160,8 +161,8 @@ class Lattice:
             letter, amount = q.nodes[node, 4:6].tolist()
             pieces.append((int(q.links[node, 1]), int(letter), amount))
             node = int(q.links[node, 0])
-        shot = pieces_of(int(q.best[2]), q.shot)
-        return Path.of(self.task.fleet, self.task.start, [*pieces[::-1], *shot])
+        shot = pieces_of(int(q.best[2]), q.shot[0])
+        return Path.of(self.query.fleet, self.query.start, [*pieces[::-1], *shot])
 
     def edges(self, most: int) -> tuple[Array, Array]:
         """Some edges of the tree: (n, 4) rows (push, letter, amount, cost) and the poses (n, 3) where they begin."""
@@ -176,9 +177,9 @@ def _doubled(array: np.ndarray) -> np.ndarray:
     return np.concatenate([array, np.empty_like(array)])
 
 
-def largest_disc(task: Task) -> tuple[Array, float]:
+def largest_disc(query: Query) -> tuple[Array, float]:
     """Middle, in O, and radius of (nearly) the largest disc inside the object, never larger."""
-    outline = task.bodies[0].outline
+    outline = query.bodies[0].outline
     if outline.is_circle:
         return outline.centre, outline.radius
     import shapely

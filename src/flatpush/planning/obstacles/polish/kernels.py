@@ -7,23 +7,9 @@ import numpy as np
 
 from ....compiled import inner, kernel
 from ....geometry.pose import Array
-from ..kernels import (
-    COLUMNS,
-    COST,
-    STRAIGHT,
-    WORDS,
-    amount_of,
-    changes,
-    connect,
-    copy,
-    drive,
-    letter_of,
-    piece_cost,
-    put,
-    random,
-    set_piece,
-)
-from ..task import TaskArrays
+from ....steering.six_words import MOST_WORDS, STRAIGHT, WORD, Records, drive, price
+from ...query_arrays import QueryArrays
+from ..kernels import changes, connect, put, random
 
 MOST = 256
 FAR = 48  # legs of a path that one word may replace at first
@@ -42,21 +28,21 @@ class Legs(NamedTuple):
     """A chain of legs, in arrays with room for MOST.
 
     Attributes:
-        poses: of its knots, shape (MOST + 1, 3); pushes: of its legs, shape (MOST,); rows: their
-            words, shape (MOST, COLUMNS).
+        poses: of its knots, shape (MOST + 1, 3); pushes: of its legs, shape (MOST,); words: of them, six_words.WORD,
+            shape (MOST,).
     """
 
     poses: Array
     pushes: np.ndarray
-    rows: Array
+    words: Records
 
 
 @kernel()
-def total(T: TaskArrays, legs: Legs, n: int) -> float:
+def total(T: QueryArrays, legs: Legs, n: int) -> float:
     """What a chain of n legs costs."""
-    cost = legs.rows[0, COST]
+    cost = legs.words[0].cost
     for i in range(1, n):
-        cost += legs.rows[i, COST] + T.switching[legs.pushes[i - 1], legs.pushes[i]]
+        cost += legs.words[i].cost + T.switching[legs.pushes[i - 1], legs.pushes[i]]
     return cost
 
 
@@ -65,51 +51,52 @@ def _copy(legs: Legs, n: int, to: Legs) -> None:
     for i in range(n):
         to.pushes[i] = legs.pushes[i]
         put(legs.poses[i], to.poses[i])
-        copy(legs.rows[i], to.rows[i])
+        to.words[i] = legs.words[i]
     put(legs.poses[n], to.poses[n])
 
 
 @inner
-def _split(T: TaskArrays, legs: Legs, n: int, leg: int, share: float) -> int:
+def _split(T: QueryArrays, legs: Legs, n: int, leg: int, share: float) -> int:
     """Puts a knot into a leg, after a share of its length, on the path; returns the number of legs."""
-    poses, pushes, rows = legs.poses, legs.pushes, legs.rows
+    poses, pushes, words = legs.poses, legs.pushes, legs.words
     a = pushes[leg]
-    radius, law = T.cars[a].radius, T.laws[a]
+    car, radius = T.cars[a], T.cars[a].radius
     for i in range(n, leg, -1):
         put(poses[i], poses[i + 1])
     for i in range(n - 1, leg - 1, -1):
         pushes[i + 1] = pushes[i]
-        copy(rows[i], rows[i + 1])
+        words[i + 1] = words[i]
+    before, after = words[leg], words[leg + 1]
     length = 0.0
     for piece in range(3):
-        length += amount_of(rows[leg], piece) * (1.0 if letter_of(rows[leg], piece) == STRAIGHT else radius)
+        length += before.amount[piece] * (1.0 if before.letter[piece] == STRAIGHT else radius)
     left = share * length
-    rows[leg, COST], rows[leg + 1, COST] = 0.0, 0.0
+    before.cost, after.cost = 0.0, 0.0
+    before.flat, after.flat = left, length - left
     put(poses[leg], poses[leg + 1])
     for piece in range(3):
-        letter, amount = letter_of(rows[leg], piece), amount_of(rows[leg], piece)
+        letter, amount = before.letter[piece], before.amount[piece]
         unit = 1.0 if letter == STRAIGHT else radius
         begin = min(amount, left / unit)
         left = max(0.0, left - begin * unit)
-        set_piece(rows[leg], piece, letter, begin)
-        set_piece(rows[leg + 1], piece, letter, amount - begin)
-        rows[leg, COST] += piece_cost(law[letter], begin)
-        rows[leg + 1, COST] += piece_cost(law[letter], amount - begin)
-        drive(T, a, letter, begin, poses[leg + 1])
+        before.amount[piece], after.amount[piece] = begin, amount - begin
+        before.cost += price(car, letter, begin)
+        after.cost += price(car, letter, amount - begin)
+        drive(car, letter, begin, poses[leg + 1])
     return n + 1
 
 
 @inner
 def _replace(
-    T: TaskArrays, legs: Legs, n: int, first: int, after: int, push: int, buffer: Array, here: Array
+    T: QueryArrays, legs: Legs, n: int, first: int, after: int, push: int, buffer: Records, here: Array
 ) -> int:
     """One word of a push instead of the legs from `first` up to `after`, not included; legs left, or -1."""
-    poses, pushes, rows = legs.poses, legs.pushes, legs.rows
+    poses, pushes, words = legs.poses, legs.pushes, legs.words
     old = 0.0
     for i in range(max(first, 1), min(after + 1, n)):
         old += T.switching[pushes[i - 1], pushes[i]]
     for i in range(first, after):
-        old += rows[i, COST]
+        old += words[i].cost
     if first > 0 and pushes[first - 1] != push:
         old -= T.switching[pushes[first - 1], push]
         if old <= 0.0 or not changes(T, pushes[first - 1], push, poses[first]):
@@ -129,10 +116,10 @@ def _replace(
         return -1
     gone = after - first - 1
     pushes[first] = push
-    copy(buffer[k], rows[first])
+    words[first] = buffer[k]
     for i in range(first + 1, n - gone):
         pushes[i] = pushes[i + gone]
-        copy(rows[i + gone], rows[i])
+        words[i] = words[i + gone]
     for i in range(first + 1, n - gone + 1):
         put(poses[i + gone], poses[i])
     return n - gone
@@ -140,11 +127,11 @@ def _replace(
 
 @inner
 def _shift(
-    T: TaskArrays, legs: Legs, low: int, high: int, state: np.ndarray, spread: float, limit: float, buffer: Array,
+    T: QueryArrays, legs: Legs, low: int, high: int, state: np.ndarray, spread: float, limit: float, buffer: Records,
     here: Array,
 ) -> bool:  # fmt: skip
     """Shifts the knots low … high alike and steers the legs about them again; whether they cost less than the limit."""
-    poses, pushes, rows = legs.poses, legs.pushes, legs.rows
+    poses, pushes, words = legs.poses, legs.pushes, legs.words
     radius = T.cars[pushes[low]].radius
     dx, dy, turn = radius * spread * _normal(state), radius * spread * _normal(state), spread * _normal(state)
     mx, my = poses[low, 0], poses[low, 1]
@@ -160,16 +147,16 @@ def _shift(
         k = connect(T, pushes[i], poses[i], poses[i + 1], limit - cost, TRIES, buffer, here)
         if k < 0:
             return False
-        cost += buffer[k, COST]
-        copy(buffer[k], rows[i])
+        cost += buffer[k].cost
+        words[i] = buffer[k]
     return cost < limit
 
 
 @kernel()
-def polish(T: TaskArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> int:
+def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> int:
     """Tries a number of moves; returns the number of legs that the chain then has."""
-    new = Legs(np.empty((MOST + 1, 3)), np.empty(MOST, np.int64), np.empty((MOST, COLUMNS)))
-    buffer, here = np.empty((WORDS, COLUMNS)), np.empty(3)
+    new = Legs(np.empty((MOST + 1, 3)), np.empty(MOST, np.int64), np.empty(MOST, WORD))
+    buffer, here = np.empty(MOST_WORDS, WORD), np.empty(3)
     k = len(T.cars)
     knot = KNOT * total(T, legs, n)
     cost = total(T, legs, n) + knot * n
@@ -190,7 +177,7 @@ def polish(T: TaskArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> 
             spread = math.exp(math.log(SMALL) + random(state) * (math.log(LARGE) - math.log(SMALL)))
             limit = 0.0
             for i in range(low - 1, high + 1):
-                limit += new.rows[i, COST]
+                limit += new.words[i].cost
             limit -= GAIN * cost
             if m > n:
                 limit -= total(T, new, m) + knot * m - cost
@@ -234,19 +221,19 @@ def polish(T: TaskArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> 
 
 
 @kernel()
-def thread(T: TaskArrays, knots: Array, arrived: np.ndarray, given: Array, n: int, legs: Legs) -> int:
+def thread(T: QueryArrays, knots: Array, arrived: np.ndarray, given: Records, n: int, legs: Legs) -> int:
     """The cheapest chain over some of the knots of a path, in order.
 
     Leg i of the path leads with push arrived[i] and the word given[i] from knot i to knot i + 1; longer legs are words
     that keep clear, of one of the pushes of the legs that they replace. Returns how many legs the chain has.
     """
     k = len(T.cars)
-    best, words = np.empty((n + 1, k)), np.empty((n + 1, k, COLUMNS))
+    best, words = np.empty((n + 1, k)), np.empty((n + 1, k), WORD)
     before, by = np.empty((n + 1, k), np.int64), np.empty((n + 1, k), np.int64)
     for j in range(n + 1):
         for a in range(k):
             best[j, a], before[j, a], by[j, a] = np.inf, -1, -1
-    buffer, here = np.empty((WORDS, COLUMNS)), np.empty(3)
+    buffer, here = np.empty(MOST_WORDS, WORD), np.empty(3)
     for j in range(1, n + 1):
         for i in range(max(0, j - FAR), j):
             for a in range(k):
@@ -265,13 +252,13 @@ def thread(T: TaskArrays, knots: Array, arrived: np.ndarray, given: Array, n: in
                             cost, source = value, b
                 if cost >= best[j, a]:
                     continue
-                if i == j - 1 and arrived[i] == a and cost + given[i, COST] < best[j, a]:
-                    best[j, a], before[j, a], by[j, a] = cost + given[i, COST], i, source
-                    copy(given[i], words[j, a])
+                if i == j - 1 and arrived[i] == a and cost + given[i].cost < best[j, a]:
+                    best[j, a], before[j, a], by[j, a] = cost + given[i].cost, i, source
+                    words[j, a] = given[i]
                 found = connect(T, a, knots[i], knots[j], best[j, a] - cost, TRIES, buffer, here)
                 if found >= 0:
-                    best[j, a], before[j, a], by[j, a] = cost + buffer[found, COST], i, source
-                    copy(buffer[found], words[j, a])
+                    best[j, a], before[j, a], by[j, a] = cost + buffer[found].cost, i, source
+                    words[j, a] = buffer[found]
     a = 0
     for b in range(k):
         a = b if best[n, b] < best[n, a] else a
@@ -286,7 +273,7 @@ def thread(T: TaskArrays, knots: Array, arrived: np.ndarray, given: Array, n: in
         put(knots[j], legs.poses[at])
         at -= 1
         legs.pushes[at] = b
-        copy(words[j, b], legs.rows[at])
+        legs.words[at] = words[j, b]
         j, b = before[j, b], by[j, b]
     put(knots[0], legs.poses[0])
     return count

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...path import COLUMNS, Path, Piece, pieces_of
-from ..task import Task
+from ...path import Path, Piece, pieces_of
+from ...query import Query
 
 KNOTS = 48  # of a path, of which the cheapest chain is made
 
@@ -15,30 +15,31 @@ class Chain:
         cost: of the chain; path: what it is.
     """
 
-    def __init__(self, task: Task, path: Path, seed: int) -> None:
+    def __init__(self, query: Query, path: Path, seed: int) -> None:
+        from ....steering.six_words import WORD
         from .kernels import MOST, Legs, thread, total
 
-        self.task = task
+        self.query = query
         self.state = np.array([seed], dtype=np.uint64)
-        self._arrays = Legs(np.zeros((MOST + 1, 3)), np.zeros(MOST, np.int64), np.zeros((MOST, COLUMNS)))
+        self._arrays = Legs(np.zeros((MOST + 1, 3)), np.zeros(MOST, np.int64), np.zeros(MOST, WORD))
         legs = _legs(path)
         knots = np.array([path.poses[i] for i in [0, *np.cumsum([len(leg) for leg in legs])]])
         arrived = np.array([leg[0][0] for leg in legs])
-        given = np.zeros((len(legs), COLUMNS))
-        for row, leg in zip(given, legs, strict=True):
-            row[0] = Path.of(path.fleet, path.start, leg).cost
+        given = np.zeros(len(legs), WORD)
+        for word, leg in zip(given, legs, strict=True):
+            word["cost"] = Path.of(path.fleet, path.start, leg).cost
             for i, (_, letter, amount) in enumerate(leg):
-                row[1 + 2 * i : 3 + 2 * i] = letter, amount
-        self.legs = int(thread(task.arrays, knots, arrived, given, len(legs), self._arrays))
-        self.cost = float(total(task.arrays, self._arrays, self.legs)) if self.legs else np.inf
+                word["letter"][i], word["amount"][i] = letter, amount
+        self.legs = int(thread(query.arrays, knots, arrived, given, len(legs), self._arrays))
+        self.cost = float(total(query.arrays, self._arrays, self.legs)) if self.legs else np.inf
 
     def improve(self, moves: int) -> bool:
         """Tries a number of moves; True if the path got cheaper."""
         from .kernels import polish, total
 
         before = self.cost
-        self.legs = int(polish(self.task.arrays, self._arrays, self.legs, self.state, moves))
-        self.cost = float(total(self.task.arrays, self._arrays, self.legs))
+        self.legs = int(polish(self.query.arrays, self._arrays, self.legs, self.state, moves))
+        self.cost = float(total(self.query.arrays, self._arrays, self.legs))
         return self.cost < before * (1 - 1e-12)
 
     @property
@@ -50,9 +51,9 @@ class Chain:
     @property
     def path(self) -> Path:
         pieces: list[Piece] = []
-        for push, row in zip(self._arrays.pushes[: self.legs], self._arrays.rows[: self.legs], strict=True):
-            pieces += pieces_of(int(push), row)
-        return Path.of(self.task.fleet, self._arrays.poses[0], pieces)
+        for push, word in zip(self._arrays.pushes[: self.legs], self._arrays.words[: self.legs], strict=True):
+            pieces += pieces_of(int(push), word)
+        return Path.of(self.query.fleet, self._arrays.poses[0], pieces)
 
 
 def _legs(path: Path) -> list[list[Piece]]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...path import COLUMNS, Path, pieces_of
-from ..task import Task
+from ...path import Path, pieces_of
+from ...query import Query
 
 ROOM = 512  # nodes of each tree
 BUDGET = 2000  # words looked at
@@ -21,37 +21,38 @@ class Trees:
         size: nodes of both trees; work: words that were looked at.
     """
 
-    def __init__(self, task: Task, seed: int, budget: int = BUDGET, direct: bool = True) -> None:
+    def __init__(self, query: Query, seed: int, budget: int = BUDGET, direct: bool = True) -> None:
+        from ....steering.six_words import WORD
         from .kernels import Forest, grow, straight
 
-        k = task.fleet.size
-        self._task = task
+        k = query.fleet.size
+        self._query = query
         first = np.zeros(k, np.bool_)
-        first[task.first] = True
-        link = np.zeros(COLUMNS)
+        first[query.first] = True
+        link = np.zeros(1, WORD)
         self.size, self.work = 2, k
-        push = int(straight(task.arrays, first, task.start, task.goal, link)) if direct else -1
+        push = int(straight(query.arrays, first, query.start, query.goal, link)) if direct else -1
         if push >= 0:
-            self.path: Path | None = Path.of(task.fleet, task.start, pieces_of(push, link))
+            self.path: Path | None = Path.of(query.fleet, query.start, pieces_of(push, link[0]))
             return
         self._forest = Forest(
-            np.empty((2, ROOM, 3)), np.full((2, ROOM), -1), np.full((2, ROOM), -1), np.zeros((2, ROOM, COLUMNS)),
+            np.empty((2, ROOM, 3)), np.full((2, ROOM), -1), np.full((2, ROOM), -1), np.zeros((2, ROOM), WORD),
             np.ones(2, np.int64), first,
         )  # fmt: skip
-        self._forest.poses[:, 0] = task.start, task.goal
+        self._forest.poses[:, 0] = query.start, query.goal
         joint, state = np.full(3, -1), np.array([seed], dtype=np.uint64)
-        left = grow(task.arrays, task.extent, self._forest, state, joint, link, budget - k)
+        left = grow(query.arrays, query.extent, self._forest, state, joint, link, budget - k)
         self.size, self.work = int(self._forest.sizes.sum()), budget - max(int(left), 0)
         self.path = None if left < 0 else self._path(joint, link)
 
     def _path(self, joint: np.ndarray, link: np.ndarray) -> Path:
-        pieces = pieces_of(int(joint[2]), link)
+        pieces = pieces_of(int(joint[2]), link[0])
         node = int(joint[0])
         while node > 0:
-            pieces = pieces_of(int(self._forest.pushes[0, node]), self._forest.rows[0, node]) + pieces
+            pieces = pieces_of(int(self._forest.pushes[0, node]), self._forest.words[0, node]) + pieces
             node = int(self._forest.parents[0, node])
         node = int(joint[1])
         while node > 0:
-            pieces += pieces_of(int(self._forest.pushes[1, node]), self._forest.rows[1, node])
+            pieces += pieces_of(int(self._forest.pushes[1, node]), self._forest.words[1, node])
             node = int(self._forest.parents[1, node])
-        return Path.of(self._task.fleet, self._task.start, pieces)
+        return Path.of(self._query.fleet, self._query.start, pieces)

@@ -1,4 +1,4 @@
-"""The task of a scene, and why it cannot be done."""
+"""The query of a scene with something in the way, and why nothing can begin or end."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,55 +10,56 @@ from ...geometry.collision import Body, World
 from ...problem import Scene
 from ...steering.fleet import Fleet
 from ..options import PushOption
+from ..query import Query
 from ..transits import LEAST_GAP
-from .task import Task
 
 # More than is asked for, since the judge's clearance is a lower bound, at most 10 µm below the true one [m].
 SPARE = 1.5e-5
 
 
-def task_of(scene: Scene, options: Sequence[PushOption], fleet: Fleet) -> Task:
+def query_of(scene: Scene, options: Sequence[PushOption], fleet: Fleet) -> Query:
     """What is asked of a search among a scene's obstacles with pushes that have cars."""
     pusher = scene.pusher
     placements = [option.placement for option in options if option.placement is not None]
     backs = [transform([0.0, 0.0, p.pose[2]], [-pusher.approach, 0.0]) for p in placements]
-    return Task(
+    return Query(
         fleet,
+        scene.start_pose,
+        scene.goal_pose,
         World.of(scene.workspace.bounds, scene.workspace.obstacles),
         [Body.of(scene.object.outline, p.tips, pusher.tip_radius) for p in placements],
         np.array(backs),
-        scene.start_pose,
-        scene.goal_pose,
         scene.planning.clearance + SPARE,
+        robust=scene.planning.robust,
     )
 
 
-def careful(scene: Scene, task: Task) -> Task:
+def careful(scene: Scene, query: Query) -> Query:
     """The same with so much room about every change of push that the hand finds its way from any contact to any."""
     if scene.pusher.transit == "lift":
-        return replace(task, inside=True)
+        return replace(query, inside=True)
     gap = max(scene.planning.clearance, LEAST_GAP)
     return replace(
-        task, room=2.05 * float(np.max(task.arrays.hands["reach"])) + 2 * gap + scene.planning.clearance
+        query, room=2.05 * float(np.max(query.arrays.hands["reach"])) + 2 * gap + scene.planning.clearance
     )
 
 
-def obstructions(scene: Scene, task: Task, options: Sequence[PushOption]) -> str:
+def obstructions(scene: Scene, query: Query, options: Sequence[PushOption]) -> str:
     """Why no push can begin at the start, or end at the goal; empty where some can."""
     from ...geometry.collision import pose_clearance
 
     need = scene.planning.clearance
-    for name, pose, able in (("start", task.start, task.first), ("goal", task.goal, task.last)):
+    for name, pose, able in (("start", query.start, query.first), ("goal", query.goal, query.last)):
         if able:
             continue
-        alone = pose_clearance(task.world, Body.of(task.bodies[0].outline), pose)
+        alone = pose_clearance(query.world, Body.of(query.bodies[0].outline), pose)
         if alone < need:
             has = "touches or overlaps something" if alone <= 0 else f"has {1000 * alone:.2f} mm of clearance"
             return f"at the {name} the object {has}, {1000 * need:.2f} mm are asked for. "
         reasons = []
         for a, option in enumerate(options):
-            room = pose_clearance(task.world, task.bodies[a], pose)
-            what = "have no room" if room < task.clearance else "do not land clear of obstacles and bounds"
+            room = pose_clearance(query.world, query.bodies[a], pose)
+            what = "have no room" if room < query.clearance else "do not land clear of obstacles and bounds"
             reasons.append(f"{option.push.name}: its fingers {what}")
         verb = "begin" if name == "start" else "end"
         return f"no push can {verb} at the {name}. {' · '.join(reasons)}. "
