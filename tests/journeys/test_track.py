@@ -11,10 +11,11 @@ from tests.unit.test_control import PERFECT
 import flatpush as fp
 from flatpush.cli.app import app
 from flatpush.control import Camera, Measurement, SimulatedSensor
-from flatpush.control.loop.closed_loop import drive
+from flatpush.control.loop.closed_loop import drive, limits_used
+from flatpush.control.loop.limits import Limits
 from flatpush.control.tracking.plan_controller import PlanController, goal_error
 from flatpush.control.tracking.simulated_run import TrackedRun
-from flatpush.geometry import compose, transform
+from flatpush.geometry import compose
 from flatpush.simulation.plant import Plant
 
 
@@ -91,21 +92,17 @@ def test_what_the_path_law_follows_exactly_ends_at_the_goal(plan):
     assert np.rad2deg(turn) < 0.05
 
 
-def test_with_the_plan_s_time_law_the_pusher_keeps_to_the_plan(plan):
+@pytest.mark.parametrize("law", ["path", "dfl"])
+def test_with_the_plan_s_time_law_the_pusher_keeps_to_the_plan(plan, law):
     """From rest to rest in each arc, within the pusher's speed and acceleration, and in the plan's time."""
-    run = drives(plan[0], "path", plan[0].scene.start_pose, timing="plan")
+    run = drives(plan[0], law, plan[0].scene.start_pose, timing="plan")
     distance, turn = goal_error(plan[0], run.object[-1])
     assert run.outcome == "arrived"
     assert distance < 5e-5
     assert np.rad2deg(turn) < 0.05
-    pushing = [k for k, mode in enumerate(run.modes) if mode in ("path", "saturated")]
-    assert (pushing[-1] - pushing[0]) / 60 == pytest.approx(plan[0].pushes[0].times[-1], rel=0.05)
-    velocity = 60 * np.diff(run.pusher[pushing][:, :2], axis=0)
-    pusher = plan[0].scene.pusher
-    assert np.max(np.hypot(*velocity.T)) < 1.001 * pusher.speed
-    assert np.quantile(60 * np.hypot(*np.diff(velocity, axis=0).T), 0.97) < 1.1 * pusher.acceleration
-    with pytest.raises(fp.InputError, match="rests between its arcs"):
-        PlanController.of(plan[0], "dfl", timing="plan")
+    pushing = [k for k, mode in enumerate(run.modes) if mode in ("path", "saturated", "tracking")]
+    assert (pushing[-1] - pushing[0]) / 60 == pytest.approx(plan[0].pushes[0].times[-1], rel=0.02)
+    assert all(share <= 1.000001 for share in used(plan[0], run).values())
 
 
 def test_feedback_brings_back_what_grows_without_it(plan):
@@ -161,24 +158,8 @@ def test_a_push_of_one_sample_is_refused(plan):
         PlanController.of(replace(plan[0], segments=segments))
 
 
-def used(plan, run, rate=60.0):
-    """The largest shares of the limits on speed and acceleration, on the table and in the air, and of the turn rate."""
-    pusher, dt = plan.scene.pusher, 1 / rate
-    height = np.concatenate([[0.0], run.heights[:-1]])
-    tips = np.array([transform(pose, plan.pushes[0].fingers) for pose in run.pusher])
-    tips = np.concatenate([tips, np.repeat(height[:, None, None], tips.shape[1], axis=1)], axis=2)
-    speeds = np.diff(tips, axis=0) / dt
-    speed = np.max(np.linalg.norm(speeds, axis=2), axis=1)
-    acceleration = np.max(np.linalg.norm(np.diff(speeds, axis=0) / dt, axis=2), axis=1)
-    up = (height[1:] > 0) | (height[:-1] > 0)
-    either = up[1:] | up[:-1]
-    return {
-        "speed": np.max(speed[~up], initial=0) / pusher.speed,
-        "acceleration": np.max(acceleration[~either], initial=0) / pusher.acceleration,
-        "travel_speed": np.max(speed[up], initial=0) / pusher.travel_speed,
-        "travel_acceleration": np.max(acceleration[either], initial=0) / pusher.travel_acceleration,
-        "turn_rate": np.max(np.abs(np.diff(run.pusher[:, 2]))) / dt / pusher.turn_rate,
-    }
+def used(plan, run):
+    return limits_used(run, Limits.of(plan.scene.pusher, plan.pushes[0].fingers))
 
 
 @pytest.mark.parametrize("law", ["path", "dfl", "horizon"])
@@ -190,8 +171,9 @@ def test_every_limit_is_kept_with_noise(plan, law):
     assert min(shares["speed"], shares["travel_speed"]) > 0.9  # and they are used
 
 
-def test_two_fingers_carry_the_object_without_sliding(two_finger_plan):
-    run = TrackedRun(camera=PERFECT).of(two_finger_plan)
+@pytest.mark.parametrize("law", ["path", "dfl"])
+def test_two_fingers_carry_the_object_without_sliding(two_finger_plan, law):
+    run = TrackedRun(law, camera=PERFECT).of(two_finger_plan)
     assert run.outcome == "arrived"
     assert not any(mode.startswith("sliding") for mode in run.contacts)
     distance, turn = goal_error(two_finger_plan, run.object[-1])

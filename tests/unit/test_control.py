@@ -14,6 +14,7 @@ from flatpush.control.laws.reference import AbstractReference, FlatState, PathRe
 from flatpush.control.laws.steering_model import SteeringModel
 from flatpush.control.learning.belief import SteeringBelief
 from flatpush.control.loop.closed_loop import drive
+from flatpush.control.loop.limits import Limits
 from flatpush.control.tracking.learning_controller import LearningController
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, pose_error, transform
@@ -250,6 +251,36 @@ def test_a_late_camera_is_made_up_for_by_prediction(law):
         error = pose_error(found.object[-1], [0, 0.15, 0])
         assert np.hypot(error[0], error[1]) < 2e-4
         assert abs(error[2]) < 0.02
+
+
+def test_the_clock_of_a_reference_waits_for_a_hand_that_its_limits_hold_back():
+    """Half as fast the object goes the same way in twice the time, and is on its reference all the while."""
+    plant, model = square_push()
+    x, y, heading = model.flat_of([0, 0, 0])
+    path = PathReference(np.array([[0.0, 0.1, x, y, heading, 8.0]]), 0.02)
+    ways, clocks = {}, {}
+    for share in (1.0, 0.5):
+        limits = Limits(np.zeros((1, 2)), share * 0.9 * path.speed, 1.0, np.pi, 1.0, 1.0)
+        controller = TrackingController(model, Gains(4, 4), reference=path, limits=limits)
+        states = []
+        start = np.array([-0.001, 0.0, 0.02])
+        sensor = SimulatedSensor(PERFECT, np.random.default_rng(0))
+        hand = compose(start, model.pusher)
+        found = drive(
+            controller,
+            plant,
+            start,
+            hand,
+            sensor,
+            4 / share,
+            told=lambda _, state: states.append(state),  # noqa: B023
+        )
+        z = transform(found.object, model.flat_point)
+        ways[share], clocks[share] = z, states[-1].clock
+    # Where the slow one was at twice the times.
+    np.testing.assert_allclose(ways[0.5][::2], ways[1.0], atol=5e-5)
+    assert clocks[0.5] == pytest.approx(clocks[1.0], rel=2e-3)
+    assert clocks[1.0] < 0.95 * 4
 
 
 def test_nonsense_that_was_learned_is_not_believed():

@@ -36,7 +36,7 @@ def command(
     centre: Annotated[str, typer.Option(help="The centre of friction is off by DX,DY [mm].")] = "0,0",
     start: Annotated[str, typer.Option(help="The start is off by DX,DY,DEG [mm, deg].")] = "0,0,0",
     timing: Annotated[
-        str, typer.Option(help="path: at an even speed, or with the time law of the plan: even, plan.")
+        str, typer.Option(help="even: slow at the junctions of arcs; plan: from rest to rest in each.")
     ] = "even",
     frequency: Annotated[float, typer.Option(help="dfl: natural frequency [rad/s].")] = 2.0,
     damping: Annotated[float, typer.Option(help="dfl: damping ratio.")] = 1.0,

@@ -80,8 +80,8 @@ def linearised(
     """One tick of dynamic feedback linearisation ([Zhou2017] Eqs. 43-46, for any contact: docs/errata.md rows 2, 15).
 
     The compensator state is the flat speed s: ṡ = w·h, ω = (w·n)/s make z̈ = w. Where the turn is more than the
-    friction cone allows, w is scaled down as a whole, and with it ṡ and ω. Below the floor, where the law divides by
-    zero, s counts as the floor.
+    friction cone allows, it is scaled down to that. Below the floor, where the law divides by zero, s counts as the
+    floor.
 
     Args:
         x, y, heading: of the flat point. speed: s.
@@ -89,7 +89,7 @@ def linearised(
         left, right: most turn per length to either side [1/m]. floor, cap: bounds of s. dt: of the tick. hold: code.
 
     Returns:
-        s for the next tick, flat speed and turn ω to command, how far w was scaled (1: not), whether s was bounded.
+        s for the next tick, flat speed and turn ω to command, how far ω was scaled (1: not), whether s was bounded.
     """
     c, d = math.cos(heading), math.sin(heading)
     s = min(max(speed, floor), cap)
@@ -97,16 +97,17 @@ def linearised(
     wx = ax - kpx * (x - zx) - kdx * (s * c - vx)  # Eq. 46
     wy = ay - kpy * (y - zy) - kdy * (s * d - vy)
     along, across = wx * c + wy * d, wy * c - wx * d
-    scale = 1.0
-    most = s * s * (left if across > 0 else right)
-    if abs(across) > most:
-        scale = most / abs(across)
-    omega = scale * across / s  # Eq. 45
-    after = s + scale * along * dt  # Eq. 43
+    after = s + along * dt  # Eq. 43
     if after < floor or after > cap:
         bounded = True
         after = min(max(after, floor), cap)
     out = 0.5 * (s + after) if hold == RAMP else (after if hold == BEFORE else s)
+    mean = out if hold == RAMP else s  # over the tick
+    scale = 1.0
+    most = mean * out * (left if across > 0 else right)
+    if abs(across) > most:
+        scale = most / abs(across)
+    omega = scale * across / mean  # Eq. 45
     return after, out, omega, scale, bounded
 
 

@@ -1,10 +1,13 @@
 """Dynamic feedback linearisation of a sticking push: tracking in time, and stabilising at a pose.
 
 [Zhou2017] Sec. 4.1, Eqs. 34-46 (docs/errata.md rows 2, 11 and 15), for any contact: the compensator's state is the flat
-speed. Towards the end of a reference, where it is at rest, the path law takes over.
+speed, by which the law divides. A push is quasi-static: twists a times as large lead along the same way in 1/a of the
+time. So a reference that slows down is tracked at its cruising speed by a slower clock ([Dahl1990] do the same
+for arms), and the clock waits for a hand that its limits hold back. Over the last stretch the path law takes over.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +27,8 @@ from .steering_model import SteeringModel
 
 # Bounds of the flat speed, by that of the reference: the law divides by it.
 FLOOR, CAP = 0.1, 3.0
+# A hand that slows down later than it was told to is at most so many times as fast as that.
+MOST_SHARE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +36,20 @@ class TrackingState(ControllerState):
     """Of TrackingController and PostureController.
 
     Attributes:
-        begun: when it started [s].
-        speed: the compensator's state s [m/s]; nan before the first measurement.
-        scale: of w in the last tick; below 1 the friction cone bounded it.
+        begun: when it started [s]. clock: time of the reference that was reached [s].
+        speed: the compensator's state s, by the clock [m/s]; nan before the first measurement.
+        scale: of ω in the last tick; below 1 the friction cone bounded it.
         length: arc length reached, once the path law has taken over [m].
+        pace: of the clock in the last tick. wanted: the pusher's velocity that was asked for then, shape (3,).
     """
 
     begun: float = 0.0
+    clock: float = 0.0
     speed: float = float("nan")
     scale: float = 1.0
     length: float = 0.0
+    pace: float = 1.0
+    wanted: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +80,9 @@ class _Linearised(AbstractPushController[TrackingState]):
         time: float,
         target: tuple[Array, Array, Array],
         nominal: float,
+        pace: float = 1.0,
     ) -> tuple[TrackingState, Command]:
-        m, dt = self.model, 1.0 / self.rate
+        m, dt = self.model, pace / self.rate
         x, y, heading = m.flat_of(pose)
         z, dz, ddz = target
         (kpx, kpy), (kdx, kdy) = self.gains.kp, self.gains.kd
@@ -88,14 +98,15 @@ class _Linearised(AbstractPushController[TrackingState]):
         elif bounded:
             mode, note = "guarded", "the flat speed is at its bound"
         return self._command(
-            replace(state, mode=mode, note=note, speed=speed, scale=scale), pose, time, out, omega
-        )
+            replace(state, mode=mode, note=note, speed=speed, scale=scale, pace=pace),
+            pose, time, pace * out, pace * omega,
+        )  # fmt: skip
 
     def _command(
         self, state: TrackingState, pose: Array, time: float, speed: float, omega: float
     ) -> tuple[TrackingState, Command]:
         velocity = pusher_velocity(self.model, pose, speed, omega, 1 / self.rate, HOLDS.index(self.hold))
-        return state, Command(velocity)
+        return replace(state, wanted=velocity), Command(velocity)
 
     def _stop(self, state: TrackingState, time: float, outcome: str) -> tuple[TrackingState, Command]:
         return replace(state, mode="done", outcome=outcome), STOP
@@ -110,7 +121,7 @@ class TrackingController(_Linearised):
         hold: how the pusher moves in a tick, see gains.Hold.
         deceleration: of the flat point at the end [m/s²].
         limits, body, stale, noise: see AbstractController.
-        reference: of the flat point.
+        reference: of the flat point; one with time laws is tracked at its largest speed, by a clock that slows down.
         finish: after the reference has ended, follow its path on until its end is abeam.
 
     Raises:
@@ -126,15 +137,44 @@ class TrackingController(_Linearised):
         if self.reference is None:
             raise InputError("a reference is needed", key="reference")
         # Dubins references turn as tightly as their margin allows, the model a little more.
-        check_reference(self.reference, max(self.model.left, self.model.right))
+        check_reference(self._even, max(self.model.left, self.model.right))
+
+    @cached_property
+    def _even(self) -> AbstractReference:
+        """The reference by the clock: a path is run along at a constant speed."""
+        path = self.reference
+        return replace(path, laws=()) if isinstance(path, PathReference) else path
 
     def follow(self, state: TrackingState, pose: Array, time: float) -> tuple[TrackingState, Command]:
-        t, T = time - state.begun, self.reference.duration
+        state, even = self._clocked(state, pose, time), self._even
+        t, T, dt, pace = state.clock, even.duration, 1 / self.rate, 1.0
         if t >= T - self._braking_time - 1e-9:
             return self._ending(state, pose, time)
-        target = self.reference.at(t)
-        nominal = float(np.hypot(*self.reference.at(0.5 * T).velocity))
-        return self._tick(state, pose, time, target, nominal)
+        if isinstance(self.reference, PathReference):
+            pace = self.reference.speed_from(self.reference.speed * t, dt) / self.reference.speed
+        now, middle = even.at(t), even.at(0.5 * T)
+        # The mean acceleration over the tick: at a junction the acceleration jumps.
+        mean = (even.at(min(t + pace * dt, T)).velocity - now.velocity) / (pace * dt)
+        nominal = float(np.hypot(*middle.velocity))
+        return self._tick(state, pose, time, (now.position, now.velocity, mean), nominal, pace)
+
+    def _clocked(self, state: TrackingState, pose: Array, time: float) -> TrackingState:
+        """With the clock after the last tick, in which the limits may have left less of the motion than was wanted."""
+        if state.wanted is None or not state.seen.told:
+            return replace(state, clock=time - state.begun)
+        begun, done = state.seen.told[-1]
+        share = 1.0
+        if not np.array_equal(done, state.wanted):
+            asked, left = (self._flat_speed(u, pose, time - begun) for u in (state.wanted, done))
+            share = min(max(left / asked, 0.0), MOST_SHARE) if asked > 0 else 0.0
+        return replace(state, clock=state.clock + share * state.pace * (time - begun))
+
+    def _flat_speed(self, velocity: Array, pose: Array, dt: float) -> float:
+        """Of the flat point in a tick that ends at a pose, for a velocity of the pusher (3,) in W."""
+        turn = float(pose[2]) - 0.5 * float(velocity[2]) * dt
+        c, d = np.cos(turn), np.sin(turn)
+        ux, uy = float(velocity[0]), float(velocity[1])
+        return self.model.motion(float(c * ux + d * uy), float(c * uy - d * ux))[0]
 
     @property
     def _braking_time(self) -> float:
@@ -150,8 +190,8 @@ class TrackingController(_Linearised):
         path = self.reference
         if not (self.finish and isinstance(path, PathReference)):
             return self._stop(state, time, ARRIVED)
-        dt, t = 1 / self.rate, time - state.begun
-        length = state.length if state.length > 0 else min(path.length, path.run(t)[0])
+        dt = 1 / self.rate
+        length = state.length if state.length > 0 else min(path.length, path.speed * state.clock)
         found = path_command(self.model, path, pose, length, dt, deceleration=self.deceleration)
         if found is None:
             return self._stop(state, time, ARRIVED)

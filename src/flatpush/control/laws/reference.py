@@ -19,6 +19,8 @@ from .steering_model import SteeringModel
 
 # Below this share of its largest value a flat speed counts as none.
 AT_REST = 1e-3
+# A plan turns as tightly as its car, the model of it by a millionth less (steering_model.EDGE).
+TIGHTER = 1e-5
 _SAMPLES = 4001
 
 
@@ -208,8 +210,9 @@ def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Ramps:
     fastest = float(np.max(np.hypot(*velocity_at(arc.twist, tips).T)))
     turn = abs(float(arc.twist[2]))
     law = Trapezoid.along(
-        fastest * arc.duration, fastest / turn if turn > 0 else np.inf, pusher.speed, pusher.acceleration
-    )
+        fastest * arc.duration, fastest / turn if turn > 0 else np.inf, pusher.speed, pusher.acceleration,
+        pusher.turn_rate,
+    )  # fmt: skip
     share = length / law.length
     return Ramps(length, 0.0, share * law.speed, share * law.acceleration)
 
@@ -251,7 +254,7 @@ def check_reference(reference: AbstractReference, most: float = np.inf) -> None:
             value=float(ahead.min()), hint="Split the reference there and push from the other side.",
         )  # fmt: skip
     bend = np.abs(cross(v, a))[inner] / speed[inner] ** 3
-    if bend.max() > most * (1 + 1e-6):
+    if bend.max() > most * (1 + TIGHTER):
         raise InputError(
             f"the reference turns by at most {most:.4g} per metre", value=float(bend.max()),
             hint="It is tighter than the friction cone of this push allows.",

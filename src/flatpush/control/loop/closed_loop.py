@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
+from ...geometry import transform
 from ...geometry.pose import Array
 from .controller import AbstractController, ControllerState
+from .limits import Limits
 from .sensor import AbstractSensor
 
 
@@ -142,3 +144,32 @@ def drive(
         outcome,
         said,
     )
+
+
+def limits_used(run: ClosedLoopRun, limits: Limits) -> dict[str, float]:
+    """The greatest share of each limit, by the differences of where the fingertips were at the ticks.
+
+    Returns:
+        speed, acceleration (of the fastest fingertip on the table), travel_speed, travel_acceleration (in the air, with
+        the climb, and between a tick on the table and one in the air) and turn_rate.
+    """
+    if len(run.times) < 3:
+        return dict.fromkeys(
+            ("speed", "acceleration", "travel_speed", "travel_acceleration", "turn_rate"), 0.0
+        )
+    dt = float(run.times[1] - run.times[0])
+    height = np.concatenate([[0.0], run.heights[:-1]])  # at the beginning of each tick
+    flat = np.array([transform(pose, limits.tips) for pose in run.pusher])
+    tips = np.concatenate([flat, np.repeat(height[:, None, None], flat.shape[1], axis=1)], axis=2)
+    speeds = np.diff(tips, axis=0) / dt
+    speed = np.max(np.linalg.norm(speeds, axis=2), axis=1)
+    acceleration = np.max(np.linalg.norm(np.diff(speeds, axis=0) / dt, axis=2), axis=1)
+    up = (height[1:] > 0) | (height[:-1] > 0)
+    either = up[1:] | up[:-1]
+    return {
+        "speed": float(np.max(speed[~up], initial=0)) / limits.speed,
+        "acceleration": float(np.max(acceleration[~either], initial=0)) / limits.acceleration,
+        "travel_speed": float(np.max(speed[up], initial=0)) / limits.travel_speed,
+        "travel_acceleration": float(np.max(acceleration[either], initial=0)) / limits.travel_acceleration,
+        "turn_rate": float(np.max(np.abs(np.diff(run.pusher[:, 2])))) / dt / limits.turn_rate,
+    }

@@ -32,9 +32,9 @@ FRAMES, LOOK = 10, 0.3
 # with for coming to rest: turning takes its part.
 RESERVE, BRAKE = 0.5, 0.6
 # The shares of the speed and the acceleration that are planned with; the rest is for corrections.
-CRUISE, RAMP = 0.98, 0.9
+CRUISE, RAMP = {"even": 0.98, "plan": 0.998}, {"even": 0.9, "plan": 0.99}
 # The share of the speed at which the junctions of arcs are passed.
-SLOW = {"path": 0.03, "dfl": 0.2}
+SLOW = 0.03
 
 #: How the outcome of a run begins that ended off its goal.
 BESIDE = "ended beside the goal"
@@ -115,18 +115,13 @@ class PlanController(AbstractController[PlanState]):
         Args:
             gains: of the law dfl; default: natural frequency 2 rad/s, critically damped.
             timing: "even": the plan's time law without its rests: slow at the junctions of its arcs;
-                "plan": from rest to rest in each arc, for the law path.
+                "plan": from rest to rest in each arc, in the plan's time.
             learn: adapts the model of each push of one finger. sd: of a frame's position and angle [m, rad].
             tolerance: default: the scene's, of the goal.
 
         Raises:
             InputError: for a plan without pushes, a push without motion, and as the laws do.
         """
-        if timing == "plan" and law != "path":
-            raise InputError(
-                "feedback linearisation needs a flat speed > 0, and the plan's time law rests between its arcs",
-                key="timing", value=timing, hint="Use an even speed, or the path law.",
-            )  # fmt: skip
         if plan.status != "solved" or not plan.pushes:
             raise InputError("there is no push to follow in this plan", hint="It has none, or is not solved.")
         scene, first = plan.scene, plan.pushes[0]
@@ -136,7 +131,10 @@ class PlanController(AbstractController[PlanState]):
         if not min(within) > 0:
             raise InputError("a tolerance is positive", key="tolerance", value=within)
         gentle = replace(
-            scene.pusher, speed=CRUISE * scene.pusher.speed, acceleration=RAMP * scene.pusher.acceleration
+            scene.pusher,
+            speed=CRUISE[timing] * scene.pusher.speed,
+            acceleration=RAMP[timing] * scene.pusher.acceleration,
+            turn_rate=CRUISE[timing] * scene.pusher.turn_rate,
         )
         found: list[OnePush] = []
         for segment in plan.pushes:
@@ -149,7 +147,7 @@ class PlanController(AbstractController[PlanState]):
                 raise InputError(f"the push {segment.push!r} cannot be steered: {option.refusal}")
             model = _model(scene, option)
             path = PathReference.of_push(
-                segment, model, pusher=gentle, slow=0.0 if timing == "plan" else SLOW[law]
+                segment, model, pusher=gentle, slow=0.0 if timing == "plan" else SLOW
             )
             braking = BRAKE * scene.pusher.acceleration / _fastest(model, segment)
             one: OnePush
