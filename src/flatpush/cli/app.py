@@ -10,7 +10,7 @@ import typer
 
 from .. import compiling
 from ..errors import FlatpushError
-from . import describe, experiment, export, identify, init, plan, simulate, track, verify
+from . import describe, experiment, export, identify, init, plan, run, simulate, track, verify
 from .common import CompilingNotice
 
 app = typer.Typer(
@@ -28,6 +28,7 @@ app.command("simulate")(simulate.command)
 app.command("describe")(describe.command)
 app.command("export")(export.command)
 app.command("track")(track.command)
+app.command("run")(run.command)
 app.command("identify")(identify.command)
 app.command("init")(init.command)
 app.command("experiment")(experiment.command)

@@ -34,6 +34,7 @@ CONTACTS = {
     "sliding_right": (words.SLIDES_RIGHT, "#b35c00"),
     "separation": (words.OFF, "#d4d4d4"),
     "rest": (words.RESTS, "#9a9a9a"),
+    "": ("not known", "#eeeeee"),
 }
 MODES = {
     "path": "#4477aa", "tracking": "#4477aa", "posture": "#66ccee", "push": "#4477aa", "look": "#d9cf8a",
@@ -55,7 +56,8 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
 def draw_track(plan: Plan, run: ClosedLoopRun, subtitle: str = "") -> Drawing:
     """The same as a drawing."""
     scene = plan.scene
-    title = f"{scene.object.name}: the plan followed under feedback, {float(run.times[-1]):.0f} s"
+    how = "as it was run" if set(run.modes) == {"plan"} else "followed under feedback"
+    title = f"{scene.object.name}: the plan {how}, {float(run.times[-1]):.0f} s"
     top = title_height(title, subtitle) + 6
     traces = trace_pushes(plan)
     actual = MM * transform(run.object, scene.object.cof)

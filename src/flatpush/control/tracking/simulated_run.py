@@ -56,7 +56,7 @@ class TrackedRun:
         Raises:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
-        law = self._law(plan)
+        law = self.law(plan)
         scene, first = plan.scene, plan.pushes[0]
         if any(p.fingers.shape != first.fingers.shape for p in plan.pushes):
             raise InputError("every push of a tracked plan has as many fingers as the first")
@@ -82,7 +82,8 @@ class TrackedRun:
         goal = plan.scene.planning.goal_tolerance
         return self.tolerance or (float(min(goal[:2])), float(goal[2]))
 
-    def _law(self, plan: Plan) -> AbstractController:
+    def law(self, plan: Plan) -> AbstractController:
+        """The controller alone."""
         if self.controller == "horizon":
             return HorizonController.of(
                 plan,

@@ -1,0 +1,203 @@
+"""flatpush run: a plan on a robot."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from ..errors import InputError
+from .common import error_text, numbers, pose_text, print_json, tell_failed
+from .track import CONTROLLERS
+
+if TYPE_CHECKING:
+    from ..control import AbstractController, AbstractSensor
+    from ..control.tracking.simulated_run import Law
+    from ..execution import Cycle, Limits, Robot, Run
+    from ..execution.course import Course
+    from ..problem import Plan
+
+# A controller ticks about so often [Hz].
+RATE = 60.0
+COUNTDOWN = 3
+
+
+def command(
+    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
+    robot: Annotated[
+        str, typer.Option(help="Address, such as sim, dry-run or egm://HOST:PORT; docs/robots.md.")
+    ],
+    scene: Annotated[
+        Path | None, typer.Option(help="The scene that is trusted; the plan must be for it.")
+    ] = None,
+    controller: Annotated[str | None, typer.Option(help="path, dfl or horizon; default: open loop.")] = None,
+    log: Annotated[Path | None, typer.Option(help="Log to write: .csv or .mcap.")] = None,
+    speed: Annotated[float, typer.Option(help="In parts of the plan's, up to 1.")] = 1.0,
+    base_frame: Annotated[
+        str | None,
+        typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of a simulated camera's noise.")] = 0,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a robot moves.")] = False,
+    figure: Annotated[Path | None, typer.Option(help="Planned against executed: .svg or .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> int:
+    """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C stops the robot."""
+    from ..control import ARRIVED
+    from ..control.tracking.plan_controller import goal_error
+    from ..documents import check_outputs, load_plan, load_scene
+    from ..execution import DONE, open_robot, run
+    from ..execution.log import check_log
+    from ..execution.run import to_controller, way
+    from ..simulation import verify
+
+    if controller is not None and controller not in CONTROLLERS:
+        raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
+    if seed < 0:
+        raise InputError("--seed is 0 or more", value=seed)
+    frame = numbers(base_frame, 4, "--base-frame")
+    check_outputs([plan, scene], [log, figure])
+    if log is not None:
+        check_log(log)
+    if figure is not None:
+        from ..view.figure import check_ending
+
+        check_ending(figure, (".svg", ".png"))
+    loaded = load_plan(plan)
+    failed = (
+        verify(loaded, None if scene is None else load_scene(scene)).failed
+        if loaded.status == "solved"
+        else ()
+    )
+    if failed:
+        tell_failed(failed)
+        typer.echo("the plan fails verification; nothing was moved", err=True)
+        return 4
+    with open_robot(robot, loaded, frame) as arm:
+        course = (way if controller is None else to_controller)(loaded, arm, speed)
+        _show(arm.limits, course, loaded, speed)
+        if getattr(arm, "real", True):
+            _ask(yes, robot)
+        law, eyes = (
+            (None, None) if controller is None else _closed(loaded, arm, cast("Law", controller), speed, seed)
+        )
+        ended = run(loaded, arm, law, eyes, log, speed=speed, told=_progress(loaded.duration / speed))
+    if sys.stderr.isatty():
+        sys.stderr.write("\n")
+    result = _result(ended, controller)
+    good = ended.outcome in (DONE, ARRIVED)
+    if ended.object is not None:
+        distance, turn = goal_error(loaded, ended.object)
+        result |= {"final_pose": [float(v) for v in ended.object], "distance": distance, "turn": turn}
+    if figure is not None:
+        from ..view.track_figure import track_figure
+
+        track_figure(loaded, ended.as_followed(), figure, f"on {robot}: {ended.outcome}")
+        result["figure"] = str(figure)
+    if as_json:
+        print_json(result)
+    else:
+        _tell(result, log)
+    return 0 if good else 3
+
+
+def _closed(
+    plan: Plan, robot: Robot, law: Law, speed: float, seed: int
+) -> tuple[AbstractController[Any], AbstractSensor]:
+    """A controller within the robot's limits, and a camera that is late and noisy."""
+    import numpy as np
+
+    from ..control import Camera, SimulatedSensor
+    from ..control.tracking.simulated_run import TrackedRun
+    from ..execution.run import slowed
+
+    if getattr(robot, "object", None) is None:
+        raise InputError(
+            "a controller needs eyes, and this robot does not see the object",
+            hint="Give run() a controller and eyes in Python, or leave --controller out.",
+        )
+    ticks = max(1, round(1 / (RATE * robot.limits.period)))
+    camera = Camera()
+    asked = TrackedRun(law, 1 / (ticks * robot.limits.period), camera=camera)
+    return asked.law(slowed(plan, robot.limits, speed)), SimulatedSensor(camera, np.random.default_rng(seed))
+
+
+def _show(limits: Limits, course: Course, plan: Plan, speed: float) -> None:
+    """What the robot may do, and where it goes first."""
+    a, b, c, d = (1000 * v for v in limits.workspace)
+    low, high = (1000 * v for v in limits.heights)
+    typer.echo(
+        f"limits: x {a:g} to {c:g} mm, y {b:g} to {d:g} mm, height {low:g} to {high:g} mm,"
+        f" {1000 * limits.speed:g} mm/s, {1000 * limits.acceleration:g} mm/s², {math.degrees(limits.turn_rate):.0f} °/s,"
+        f" a target every {1000 * limits.period:g} ms",
+        err=True,
+    )
+    last = [k for k, leg in enumerate(course.leg) if course.legs[leg] == course.legs[0]][-1]
+    places = [course.poses[0], course.poses[last]]
+    here, there = (f"{pose_text(p[[0, 1, 3]])} at {1000 * p[2]:.1f} mm" for p in places)
+    seconds = course.times[last] - course.times[0]
+    typer.echo(f"first approach: from {here} up, over and down to {there}, {seconds:.1f} s", err=True)
+    typer.echo(
+        f"then {len(plan.pushes)} push{'es' if len(plan.pushes) > 1 else ''}, {plan.duration / speed:.1f} s",
+        err=True,
+    )
+
+
+def _ask(yes: bool, robot: str) -> None:
+    """Before anything real moves."""
+    if not yes:
+        if not sys.stdin.isatty():
+            raise InputError(
+                "a robot moves only if somebody says so", hint="Answer on a terminal, or give --yes."
+            )
+        if not typer.confirm(f"move {robot}?", err=True):
+            raise typer.Abort
+    for left in range(COUNTDOWN, 0, -1):
+        typer.echo(f"{left} …", err=True)
+        time.sleep(1.0)
+
+
+def _progress(planned: float) -> Callable[[Cycle], None] | None:
+    """Writes where it is, and how far the tool is from where it should be, four times a second."""
+    if not sys.stderr.isatty():
+        return None
+    last = -math.inf
+
+    def told(cycle: Cycle) -> None:
+        nonlocal last
+        if cycle.time - last >= 0.25:
+            last = cycle.time
+            sys.stderr.write(
+                f"\r\033[K{cycle.time:6.1f} s of about {planned:.0f} s: {cycle.leg}, {1000 * cycle.off:.2f} mm off"
+            )
+            sys.stderr.flush()
+
+    return told
+
+
+def _result(run: Run, controller: str | None) -> dict[str, Any]:
+    return {
+        "controller": controller,
+        "outcome": run.outcome,
+        "cycles": len(run.cycles),
+        "time": run.cycles[-1].time if run.cycles else 0.0,
+        "tool_off": run.off,
+        "latest_cycle": max((cycle.late for cycle in run.cycles), default=0.0),
+    }
+
+
+def _tell(result: dict[str, Any], log: Path | None) -> None:
+    typer.echo(
+        f"{result['outcome']} after {result['time']:.2f} s, {result['cycles']} cycles; the tool was at most"
+        f" {1000 * result['tool_off']:.2f} mm from where it was sent"
+    )
+    if "final_pose" in result:
+        off = error_text(result["distance"], result["turn"])
+        typer.echo(f"the object is at {pose_text(result['final_pose'])}, off the goal by {off}")
+    for name in filter(None, (log, result.get("figure"))):
+        typer.echo(f"wrote {name}")

@@ -1,0 +1,137 @@
+"""Robots by their addresses: `sim`, `egm://192.168.125.1:6510`, `mujoco://irb120?seed=3`, or one of your own."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import entry_points
+from math import isfinite, radians
+from urllib.parse import parse_qsl, urlsplit
+
+from ..errors import InputError
+from ..problem import Plan
+from .robot import Limits, Robot
+
+GROUP = "flatpush.robots"
+# Name → function that makes one from an address and a plan; those of others come by the entry points of GROUP.
+BUILT_IN = {
+    "sim": "flatpush.execution.simulated:sim",
+    "dry-run": "flatpush.execution.simulated:dry_run",
+}
+
+
+@dataclass
+class Address:
+    """NAME, or NAME://HOST:PORT, and ?KEY=VALUE&…; lengths in mm and angles in degrees.
+
+    Attributes:
+        text: the whole. name, host, port: its parts; "" and None where there is none.
+        base: pose of the table in the robot's base frame (x, y, z, yaw) [m, rad].
+        options: what follows the question mark.
+    """
+
+    text: str
+    name: str
+    host: str = ""
+    port: int | None = None
+    base: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    options: dict[str, str] = field(default_factory=dict)
+    _used: set[str] = field(default_factory=set)
+
+    @classmethod
+    def parse(cls, text: str, base: Sequence[float] | None = None) -> "Address":
+        """Reads an address.
+
+        Raises:
+            InputError: for what is none.
+        """
+        parts = urlsplit(
+            text if "://" in text else text.replace("?", "://?", 1) if "?" in text else f"{text}://"
+        )
+        try:
+            port = parts.port
+            options = dict(parse_qsl(parts.query, strict_parsing=bool(parts.query), keep_blank_values=True))
+        except ValueError as error:
+            raise InputError(f"this is no address of a robot ({error})", value=text) from None
+        if not parts.scheme:
+            raise InputError(
+                "this is no address of a robot", value=text, hint="Such as sim or egm://HOST:PORT."
+            )
+        where = (0.0, 0.0, 0.0, 0.0) if base is None else tuple(float(v) for v in base)
+        return cls(text, parts.scheme, parts.hostname or "", port, where, options)  # type: ignore[arg-type]
+
+    def numbers(self, key: str, count: int, default: Sequence[float]) -> list[float]:
+        """The numbers of an option.
+
+        Raises:
+            InputError: for other than so many finite numbers.
+        """
+        self._used.add(key)
+        if key not in self.options:
+            return list(default)
+        try:
+            values = [float(part) for part in self.options[key].split(",")]
+        except ValueError:
+            values = []
+        if len(values) != count or not all(map(isfinite, values)):
+            what = "a number" if count == 1 else f"{count} numbers separated by commas"
+            raise InputError(f"{key} takes {what}", source=self.text, value=self.options[key])
+        return values
+
+    def limits(self, given: Limits) -> Limits:
+        """Those of a robot, tightened by the options workspace, heights, speed, acceleration and turn."""
+        self._used |= {"workspace", "heights", "speed", "acceleration", "turn"}
+        found = given
+        if "workspace" in self.options:
+            a, b, c, d = (v / 1000 for v in self.numbers("workspace", 4, ()))
+            found = found.tightened(workspace=(a, b, c, d))
+        if "heights" in self.options:
+            low, high = (v / 1000 for v in self.numbers("heights", 2, ()))
+            found = found.tightened(heights=(low, high))
+        if "speed" in self.options:
+            found = found.tightened(speed=self.numbers("speed", 1, ())[0] / 1000)
+        if "acceleration" in self.options:
+            found = found.tightened(acceleration=self.numbers("acceleration", 1, ())[0] / 1000)
+        if "turn" in self.options:
+            found = found.tightened(turn_rate=radians(self.numbers("turn", 1, ())[0]))
+        return found
+
+    def check_used(self) -> None:
+        """Refuses options that this robot does not have.
+
+        Raises:
+            InputError: for the first of them.
+        """
+        for key in self.options:
+            if key not in self._used:
+                raise InputError(
+                    f"{self.name} has no option {key!r}",
+                    source=self.text,
+                    hint=f"It has {', '.join(sorted(self._used))}.",
+                )
+
+
+def open_robot(address: str, plan: Plan, base: Sequence[float] | None = None) -> Robot:
+    """The robot at an address, not yet connected: `with` connects it.
+
+    Args:
+        plan: that it shall run; a simulated robot has its object.
+        base: pose of the table frame in the robot's base (x, y, z, yaw) [m, rad].
+
+    Raises:
+        InputError: for an address that makes no sense. MissingExtra: for a robot whose library is not installed.
+    """
+    parsed = Address.parse(address, base)
+    if plan.status != "solved" or not plan.pushes:
+        raise InputError(
+            "there is no push to run in this plan", hint=plan.reason or "Start and goal are one."
+        )
+    if parsed.name in BUILT_IN:
+        module, name = BUILT_IN[parsed.name].split(":")
+        make: Callable[[Address, Plan], Robot] = getattr(import_module(module), name)
+        return make(parsed, plan)
+    others = {point.name: point for point in entry_points(group=GROUP)}
+    if parsed.name not in others:
+        known = ", ".join(sorted({*BUILT_IN, *others}))
+        raise InputError("there is no such robot", value=address, hint=f"There are: {known}.")
+    found: Robot = others[parsed.name].load()(parsed, plan)
+    return found

@@ -1,0 +1,118 @@
+"""Writes a run as one MCAP file of standard ROS 2 messages, which ros2 bag, rosbags and Foxglove read."""
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import TYPE_CHECKING, Self
+
+from ..errors import MissingExtra
+from ..geometry.pose import Array
+
+if TYPE_CHECKING:
+    from .run import Cycle
+
+# Topic → type of its messages.
+TOPICS = {
+    "/flatpush/target": "geometry_msgs/msg/PoseStamped",
+    "/flatpush/tool": "geometry_msgs/msg/PoseStamped",
+    "/flatpush/twist": "geometry_msgs/msg/TwistStamped",
+    "/flatpush/object": "geometry_msgs/msg/PoseStamped",
+    "/flatpush/state": "std_msgs/msg/String",
+}
+FRAME = "table"
+
+
+def load() -> tuple[ModuleType, ModuleType]:
+    """The libraries.
+
+    Raises:
+        MissingExtra: if they are not installed.
+    """
+    try:
+        import mcap.writer
+        import rosbags.typesys
+    except ImportError:
+        raise MissingExtra(
+            'a log ending in .mcap needs mcap and rosbags: pip install "flatpush[export]"'
+        ) from None
+    return mcap.writer, rosbags.typesys
+
+
+class McapLog:
+    """Every cycle: target, tool and twist (of the target), the object where it is known, and text where that changes.
+
+    Messages are not kept back, so that a run that is killed leaves what was written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], name: str) -> None:
+        writer, typesys = load()
+        store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        self._types, self._encode = store.types, store.serialize_cdr
+        self._file = Path(path).open("wb")  # noqa: SIM115  # closed by __exit__
+        self._writer = writer.Writer(self._file, use_chunking=False)
+        self._writer.start(profile="ros2", library="flatpush")
+        self._writer.add_metadata("flatpush", {"object": name})
+        schemas = {
+            kind: self._writer.register_schema(
+                kind, "ros2msg", store.generate_msgdef(kind, ros_version=2)[0].encode()
+            )
+            for kind in dict.fromkeys(TOPICS.values())
+        }
+        self._channels = {
+            topic: self._writer.register_channel(topic, "cdr", schemas[kind])
+            for topic, kind in TOPICS.items()
+        }
+        self._said, self._time = "", 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.finish()
+        self._file.close()
+
+    def write(self, cycle: "Cycle") -> None:
+        self._time = round(1e9 * cycle.time)
+        self._put("/flatpush/target", self._pose(cycle.target.pose))
+        self._put("/flatpush/tool", self._pose(cycle.state.pose))
+        self._put("/flatpush/twist", self._twist(cycle.target.twist))
+        if cycle.object is not None:
+            x, y, turn = cycle.object
+            self._put("/flatpush/object", self._pose([x, y, 0.0, turn]))
+        said = f"{cycle.leg}: {cycle.mode}"
+        if said != self._said:
+            self._said = said
+            self.end(said)
+
+    def end(self, outcome: str) -> None:
+        self._put("/flatpush/state", self._of("std_msgs/msg/String")(outcome))
+
+    def _of(self, kind: str) -> Callable[..., object]:
+        made: Callable[..., object] = self._types[kind]
+        return made
+
+    def _put(self, topic: str, message: object) -> None:
+        data = bytes(self._encode(message, TOPICS[topic]))
+        self._writer.add_message(self._channels[topic], self._time, data, self._time)
+
+    def _header(self) -> object:
+        stamp = self._of("builtin_interfaces/msg/Time")(self._time // 10**9, self._time % 10**9)
+        return self._of("std_msgs/msg/Header")(stamp, FRAME)
+
+    def _vector(self, x: float, y: float, z: float, kind: str = "Vector3") -> object:
+        return self._of(f"geometry_msgs/msg/{kind}")(float(x), float(y), float(z))
+
+    def _pose(self, pose: "Array | list[float]") -> object:
+        x, y, z, yaw = pose
+        turn = self._of("geometry_msgs/msg/Quaternion")(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+        placed = self._of("geometry_msgs/msg/Pose")(self._vector(x, y, z, "Point"), turn)
+        return self._of("geometry_msgs/msg/PoseStamped")(self._header(), placed)
+
+    def _twist(self, twist: Array) -> object:
+        x, y, z, spin = twist
+        moves = self._of("geometry_msgs/msg/Twist")(self._vector(x, y, z), self._vector(0.0, 0.0, spin))
+        return self._of("geometry_msgs/msg/TwistStamped")(self._header(), moves)

@@ -1,0 +1,48 @@
+"""Whose time it is: the machine's, a simulation's, or that of a robot's cycles."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Tells the time [s] and waits."""
+
+    def now(self) -> float:
+        """The time [s], from any origin."""
+        ...
+
+    def wait(self, until: float) -> None:
+        """Comes back at a time or later; at once if it has passed."""
+        ...
+
+
+class WallClock:
+    """The machine's."""
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def wait(self, until: float) -> None:
+        left = until - time.monotonic()
+        if left > 0:
+            time.sleep(left)
+
+
+class SimulatedClock:
+    """Of a simulation that is moved on while one waits, as fast as the machine can.
+
+    Args:
+        advance: moves the simulation on to a time.
+    """
+
+    def __init__(self, advance: Callable[[float], None]) -> None:
+        self._advance, self._time = advance, 0.0
+
+    def now(self) -> float:
+        return self._time
+
+    def wait(self, until: float) -> None:
+        if until > self._time:
+            self._advance(until)
+            self._time = until
