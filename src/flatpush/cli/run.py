@@ -133,8 +133,8 @@ def _show(limits: Limits, course: Course, plan: Plan, speed: float) -> None:
     low, high = (1000 * v for v in limits.heights)
     typer.echo(
         f"limits: x {a:g} to {c:g} mm, y {b:g} to {d:g} mm, height {low:g} to {high:g} mm,"
-        f" {1000 * limits.speed:g} mm/s, {1000 * limits.acceleration:g} mm/s², {math.degrees(limits.turn_rate):.0f} °/s,"
-        f" a target every {1000 * limits.period:g} ms",
+        f" {1000 * limits.speed:g} mm/s, {1000 * limits.acceleration:g} mm/s²,"
+        f" {math.degrees(limits.turn_rate):.0f} °/s, a target every {1000 * limits.period:g} ms",
         err=True,
     )
     last = [k for k, leg in enumerate(course.leg) if course.legs[leg] == course.legs[0]][-1]
