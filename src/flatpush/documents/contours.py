@@ -54,7 +54,8 @@ def outer_contour(drawing: Drawing, source: str, choice: str = "") -> tuple[Arra
     if any(not curve.aside for curve in curves):
         left += [_left(curve, curve.aside) for curve in curves if curve.aside]
         curves = [curve for curve in curves if not curve.aside]
-    pieces = [(curve, points) for curve in curves if extent(points := _rough(curve)) > 0]
+    with np.errstate(invalid="ignore"):  # of what is not finite
+        pieces = [(curve, points) for curve in curves if not extent(points := _rough(curve)) <= 0]
     if not pieces:
         raise InputError("the drawing has no lines", source=source, hint=_nothing(left))
     if not all(np.isfinite(points).all() for _, points in pieces):
@@ -290,16 +291,18 @@ def _check_no_frame(outer: Chain, others: list[Chain], source: str, choice: str)
     if choice or not others or not upright or len(corners) > 8:
         return
     layer = next(iter(outer.layers))
-    alone = not any(outer.layers & c.layers for c in others)
+    alone = bool(layer) and not any(outer.layers & c.layers for c in others)
     named = any(word in name.casefold() for name in outer.parts[0][0].names for word in _FRAMES)
-    inner = [Polygon(c.points) for c in others] if alone and layer else []
-    # A hole that is no circle has no contours in it; a part in a frame has its holes.
-    inner = [shape for shape in inner if shape.is_valid]
-    nested = any(
-        a.area < _ROUND * a.length**2 / (4 * np.pi) and any(b is not a and a.contains(b) for b in inner)
+    # A hole that is no circle has no contours in it; a part in a frame has its holes. Of letters, which have too,
+    # there are several: on the layer of the outline one such contour is suspect, on others any.
+    inner = [shape for c in others if (shape := Polygon(c.points)).is_valid]
+    nested = [
+        a
         for a in inner
-    )
-    if named or nested:
+        if a.area < _ROUND * a.length**2 / (4 * np.pi) and any(b is not a and a.contains(b) for b in inner)
+    ]
+    nested = [a for a in nested if not any(b is not a and b.contains(a) for b in nested)]
+    if named or (nested and (alone or len(nested) == 1)):
         raise InputError(
             f"the outer contour may be the frame of the sheet: {outer.place}",
             source=source,

@@ -21,6 +21,7 @@ _LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE"
 _ASIDE = {
     **dict.fromkeys(("TEXT", "MTEXT", "ATTRIB", "ATTDEF", "RTEXT", "ARCALIGNEDTEXT"), "text"),
     **dict.fromkeys(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "TOLERANCE"), "a dimension"),
+    **dict.fromkeys(("SHAPE",), "a symbol"),
     **dict.fromkeys(("LEADER", "MULTILEADER", "MLEADER"), "a leader"),
     **dict.fromkeys(("HATCH", "MPOLYGON", "SOLID", "TRACE"), "a filled area"),
     **dict.fromkeys(("POINT",), "a point"),
@@ -42,7 +43,10 @@ _LINE_TYPES = {
     "a hidden line": ("hidden", "dashed", "dot", "acad_iso02", "acad_iso03", "acad_iso07"),
 }  # fmt: skip
 _MOST_NESTED, _MOST_ENTITIES = 8, 200_000
-_DECLARED = re.compile(rb"\$INSUNITS\s*\r?\n\s*70\s*\r?\n\s*(-?[0-9]+)")
+# A variable of the header begins with 9; the same word in a text does not declare anything.
+_SET = re.compile(rb"^[ \t]*9[ \t]*\r?\n[ \t]*\$INSUNITS[ \t]*\r?$|\x09\x00?\$INSUNITS\x00", re.M)
+_DECLARED = re.compile(rb"\s*70\s*\r?\n\s*(-?[0-9]+)")
+_FRAME_POINT = 16  # flag of a vertex that only controls the curve of its POLYLINE
 
 
 def read_dxf(path: str | os.PathLike[str]) -> Drawing:
@@ -79,9 +83,10 @@ def read_dxf(path: str | os.PathLike[str]) -> Drawing:
 
 
 def _unit(document: "Document", content: bytes, source: str) -> float | None:
-    if b"$INSUNITS" not in content:
+    declared = _SET.search(content)
+    if declared is None:
         return None  # ezdxf then says metres
-    match = _DECLARED.search(content)
+    match = _DECLARED.match(content, declared.end())
     code = int(match[1]) if match else int(document.header.get("$INSUNITS", 0))
     if code and code not in _UNITS:
         raise InputError(
@@ -98,6 +103,7 @@ class _Reader:
         self.document = document
         self.drawing = Drawing()
         self.count = 0
+        self.clip = ""  # why the entities of a block are not seen as they are
         self.layers = {layer.dxf.name.casefold(): layer for layer in document.layers}
         self.drawing.known.update(dict.fromkeys(layer.dxf.name for layer in document.layers))
 
@@ -113,6 +119,9 @@ class _Reader:
 
     def entity(self, entity: "DXFEntity", around: str, blocks: tuple[str, ...], level: int) -> None:
         kind = entity.dxftype()
+        if not entity.dxf.is_supported("layer"):
+            self.drawing.unreadable.append(Unreadable(kind, "this kind of entity is not read"))
+            return
         layer = entity.dxf.get("layer", "0")
         if layer == "0" and blocks:
             layer = around
@@ -136,7 +145,7 @@ class _Reader:
             points = _points(entity)
             if points is not None:
                 aside = self.aside(entity, layer)
-                self.drawing.curves.append(Curve(points, place, layer, names, aside))
+                self.drawing.curves.append(Curve(points, place, layer, names, aside, self.clip))
 
     def unseen(self, entity: "DXFEntity", layer: str, frozen_only: bool) -> str:
         """Why an entity is not visible. An insert on a layer that is off shows what its block has on others."""
@@ -164,10 +173,16 @@ class _Reader:
             return
         if level >= _MOST_NESTED:
             raise InputError(f"blocks are nested at most {_MOST_NESTED} levels deep", value=name)
+        from ezdxf.xclip import XClip
+
         skipped: list[str] = []
+        before, clip = self.clip, XClip(insert)
+        if clip.has_clipping_path and clip.is_clipping_enabled:
+            self.clip = f"its block {name!r} is clipped (XCLIP)"
         for one in insert.multi_insert() if insert.mcount > 1 else [insert]:
             parts = one.virtual_entities(skipped_entity_callback=lambda e, _: skipped.append(e.dxftype()))
             self.visit(parts, layer, (*blocks, name), level + 1)
+        self.clip = before
         for kind in dict.fromkeys(skipped):
             if kind in _ASIDE:
                 self.drawing.left_out.append(LeftOut(f"{kind} in block {name!r}", _ASIDE[kind]))
@@ -181,10 +196,12 @@ class _Reader:
                 )
 
     def aside(self, entity: "DXFEntity", layer: str) -> str:
-        """Why a line is no edge, by the type of the line."""
+        """Why a line is no edge, by the type of the line and what becomes of its layer."""
         name = entity.dxf.get("linetype", "BYLAYER")
+        state = self.layers.get(layer.casefold())
+        if state is not None and not state.dxf.get("plot", 1):
+            return f"layer {layer!r} is not plotted"
         if name.upper() in ("BYLAYER", "BYBLOCK"):
-            state = self.layers.get(layer.casefold())
             name = state.dxf.get("linetype", "CONTINUOUS") if state is not None else "CONTINUOUS"
         for kind, words in _LINE_TYPES.items():
             if name.casefold().startswith(words):
@@ -206,8 +223,10 @@ def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
     """What gives the polygon of an entity; None for one without length."""
     from ezdxf import path as paths
 
-    if entity.dxftype() == "POLYLINE" and not len(entity.vertices):
-        return None
+    if entity.dxftype() == "POLYLINE":
+        entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & _FRAME_POINT]
+        if not len(entity.vertices):
+            return None
     path = paths.make_path(entity)
     if not len(path):
         return None

@@ -14,28 +14,30 @@ from .drawing import FLATNESS, Curve, Drawing, LeftOut, Unreadable, extent
 from .reading import read_bytes
 from .svg_path import EllipticArc, Segment, Straight, subpaths, traced
 from .svg_style import GEOMETRY, Element, Rule, Unsupported, sheet_rules, style_of
+from .svg_units import (
+    LENGTH,
+    NO_TURN,
+    PX,
+    UNITS,
+    fitted,
+    joined,
+    number,
+    page_unit,
+    transform,
+    upright,
+    view_box,
+)
+from .svg_xml import parsed
 
-# Metres per unit of a page. px is no real length here: programs disagree about it.
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "q": 0.25e-3}
-_PX = 0.0254 / 96  # where a drawing mixes real lengths with its own units, these are CSS pixels
-_OLD_PX = 0.0254 / 90  # of Inkscape before 0.92
-_LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([a-zA-Z%]*)\s*")
 _NUMBERS = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-_FUNCTION = re.compile(r"[\s,]*([A-Za-z0-9]+)\s*\(([^()]*)\)")
 _URL = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
-_SPACES = {
-    "http://www.w3.org/2000/svg": "",
-    "http://www.w3.org/1999/xlink": "xlink:",
-    "http://www.inkscape.org/namespaces/inkscape": "inkscape:",
-    "http://www.w3.org/XML/1998/namespace": "xml:",
-}
 _CONTAINERS = ("g", "a", "svg", "switch")
 _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 # What is visible and is no line of the object, with the word for it.
 _ASIDE = {"text": "text", "flowRoot": "text", "image": "a picture"}
+_MOVING = ("animate", "animateTransform", "animateMotion", "set")
 _MOST_NESTED, _MOST_ELEMENTS = 60, 200_000
 _WHITE = ("white", "#fff", "#ffffff", "rgb(255,255,255)")
-_NO_TURN = np.hstack([np.eye(2), np.zeros((2, 1))])
 
 
 def read_svg(path: str | os.PathLike[str]) -> Drawing:
@@ -50,7 +52,7 @@ def read_svg(path: str | os.PathLike[str]) -> Drawing:
     source = os.fspath(path)
     hint = "Is it the right file, and is it complete?"
     try:
-        root, linked = _parsed(read_bytes(path))
+        root, linked = parsed(read_bytes(path))
     except expat.ExpatError as error:
         reason = f"line {error.lineno}: {expat.errors.messages[error.code]}"
         raise InputError(f"this is not a drawing in SVG ({reason})", source=source, hint=hint) from None
@@ -73,47 +75,6 @@ def read_svg(path: str | os.PathLike[str]) -> Drawing:
 
 
 _PLAIN = "Save it as plain SVG, with its style in attributes."
-
-
-def _parsed(content: bytes) -> tuple[Element | None, str]:
-    """The root element, in whatever encoding the file declares, and a style sheet that it links."""
-    parser = expat.ParserCreate(namespace_separator=" ")
-    parser.buffer_text = True
-    stack: list[Element] = []
-    roots: list[Element] = []
-    linked: list[str] = []
-
-    def short(name: str) -> str:
-        space, _, local = name.rpartition(" ")
-        return local if not space else _SPACES.get(space, "other:") + local
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if len(stack) >= 500:
-            raise InputError("the drawing has at most 500 levels")
-        parent = stack[-1] if stack else None
-        named = {short(key): value for key, value in attributes.items()}
-        element = Element(short(name), named, parser.CurrentLineNumber, parent)
-        (parent.children if parent else roots).append(element)
-        stack.append(element)
-
-    def text(data: str) -> None:
-        if stack and stack[-1].tag == "style":
-            stack[-1].text += data
-
-    def entity(*_: object) -> None:
-        raise InputError("entities in drawings are not read")
-
-    def instruction(target: str, data: str) -> None:
-        if target == "xml-stylesheet":
-            linked.append(data)
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: stack.pop()
-    parser.CharacterDataHandler = text
-    parser.EntityDeclHandler = entity
-    parser.ProcessingInstructionHandler = instruction
-    parser.Parse(content, True)
-    return (roots[0] if roots else None), "; ".join(linked)
 
 
 @dataclass(frozen=True)
@@ -163,18 +124,18 @@ class _Reader:
                     self.rules += sheet_rules(element.text, len(self.rules))
                 except Unsupported as reason:
                     raise InputError(f"{element.place}: {reason}", hint=_PLAIN) from None
-        self.drawing.unit = _page_unit(self.root)
-        box = _box(self.root)
-        sides = [_number(self.root.attributes.get(key, "")) for key in ("width", "height")]
+        self.drawing.unit = page_unit(self.root)
+        box = view_box(self.root)
+        sides = [number(self.root.attributes.get(key, "")) for key in ("width", "height")]
         viewport = (box[2], box[3]) if box is not None else (sides[0], sides[1])
-        self.visit(self.root, _State(_NO_TURN, {}, viewport), page=True)
+        self.visit(self.root, _State(NO_TURN, {}, viewport), page=True)
         if self.real and self.drawing.unit is None:
             if self.bare:
                 raise InputError(
                     f"{self.real} has lengths in real units, {self.bare} has none, and the page has no real size",
                     hint="Give the page width and height in mm and a viewBox.",
                 )
-            self.drawing.unit = _PX
+            self.drawing.unit = PX
         return self.drawing
 
     def visit(self, element: Element, state: _State, page: bool = False) -> None:
@@ -233,9 +194,14 @@ class _Reader:
         clip, mask = style.get("clip-path", ""), style.get("mask", "")
         if mask.lower() not in ("", "none"):
             refusal = f"it is masked ({mask})"
+        if style.get("filter", "").lower() not in ("", "none"):
+            refusal = f"it has a filter ({style['filter']})"
+        moving = next((child.tag for child in element.children if child.tag in _MOVING), "")
+        if moving and not page:
+            refusal = f"it moves (<{moving}>)"
         matrix = state.matrix
         if not page:
-            matrix = _joined(matrix, _transform(element, style))
+            matrix = joined(matrix, transform(element, style))
         result = replace(
             state, matrix=matrix, style=style, hidden=hidden, names=(*state.names, *own),
             layer=layer, refusal=refusal,
@@ -260,9 +226,9 @@ class _Reader:
             k in e.attributes for k in ("clip-path",) for e in (element, child)
         ):
             return None
-        matrix = _joined(state.matrix, _transform(element, style_of(element, self.rules, {})))
+        matrix = joined(state.matrix, transform(element, style_of(element, self.rules, {})))
         style = style_of(child, self.rules, {})
-        matrix = _joined(matrix, _transform(child, style))
+        matrix = joined(matrix, transform(child, style))
         parts = self.segments(child, replace(state, matrix=matrix, style=style))
         if len(parts) != 1:
             return None
@@ -280,13 +246,16 @@ class _Reader:
             self.unreadable(element, state, "it shows itself")
             return
         x, y = (self.length(element, key, state, axis) for axis, key in enumerate(("x", "y")))
-        matrix = _joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        matrix = joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
         state = replace(state, matrix=matrix, used=(*state.used, id(target)))
         if target.tag not in ("symbol", "svg"):
             self.visit(target, state)
             return
         sides = {k: v for k, v in element.attributes.items() if k in ("width", "height")}
         inner = {**target.attributes, **sides}
+        if away := next((key for key in ("refX", "refY") if target.attributes.get(key, "0") != "0"), ""):
+            self.unreadable(element, state, f"the {away} of its symbol is not read")
+            return
         style = style_of(target, self.rules, state.style)
         state = self.inside(target, state, style, False)
         if state.hidden:
@@ -317,7 +286,7 @@ class _Reader:
         x, y = (0.0, 0.0)
         if element.tag == "svg":
             x, y = (self.length(asked, key, state, axis) for axis, key in enumerate(("x", "y")))
-        box = _box(asked)
+        box = view_box(asked)
         try:
             width, height = (
                 self.length(asked, key, state, axis) for axis, key in enumerate(("width", "height"))
@@ -326,7 +295,7 @@ class _Reader:
             if box is not None:
                 raise
             width = height = np.nan
-        matrix = _joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        matrix = joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
         window = state.window
         refusal = state.refusal
         if state.style.get("overflow", "hidden") not in ("visible", "auto") and np.isfinite(width + height):
@@ -336,7 +305,7 @@ class _Reader:
             window = (corners @ matrix[:, :2].T + matrix[:, 2], f"the edge of {element.place}")
         inner = (width, height)
         if box is not None:
-            matrix = _joined(matrix, _fitted(box, width, height, given.get("preserveAspectRatio", "")))
+            matrix = joined(matrix, fitted(box, width, height, given.get("preserveAspectRatio", "")))
             inner = (box[2], box[3])
         return replace(state, matrix=matrix, viewport=inner, window=window, refusal=refusal)
 
@@ -362,7 +331,7 @@ class _Reader:
         ):
             refusal = refusal or f"it has markers ({marker})"
         for segments in self.segments(element, state):
-            moved: list[Segment] = [s.moved(_upright(state.matrix)) for s in segments]
+            moved: list[Segment] = [s.moved(upright(state.matrix)) for s in segments]
             points = traced(moved)
             cut = refusal
             if state.window is not None and not cut and not _within(points, state.window[0] * (1.0, -1.0)):
@@ -371,7 +340,7 @@ class _Reader:
 
     def is_paper(self, element: Element, state: _State) -> bool:
         """Whether a shape is a white rectangle that covers the page."""
-        box = _box(self.root)
+        box = view_box(self.root)
         if element.tag != "rect" or state.style.get("fill", "").replace(" ", "").lower() not in _WHITE:
             return False
         if box is None:
@@ -442,7 +411,7 @@ class _Reader:
         """A length in the units of the drawing; 0 if left out. axis: 0 across, 1 down, 2 of both for radii."""
         text = state.style.get(key, "") if key in GEOMETRY and element.tag in _SHAPES else ""
         text = text or element.attributes.get(key, "0")
-        match = _LENGTH.fullmatch(text)
+        match = LENGTH.fullmatch(text)
         if match is None:
             if text.strip().lower() == "auto" and key in ("width", "height"):
                 return self.length(Element(element.tag, {key: "100%"}, element.line), key, state, axis)
@@ -456,11 +425,11 @@ class _Reader:
             if not np.isfinite(whole):
                 raise ValueError(f"its {key} is a part of a page of unknown size ({text!r})")
             return value / 100 * float(whole)
-        if unit not in ("", "px", *_UNITS):
+        if unit not in ("", "px", *UNITS):
             raise ValueError(f"the unit of its {key} is not known ({text!r})")
         if value and element.tag in _SHAPES:
             self.note(element, bare=unit in ("", "px"))
-        return value * (_UNITS[unit] / _PX if unit in _UNITS else 1.0)
+        return value * (UNITS[unit] / PX if unit in UNITS else 1.0)
 
     def note(self, element: Element, bare: bool) -> None:
         if bare:
@@ -514,29 +483,13 @@ def _within(points: Callable[[float], Array], corners: Array) -> bool:
     )
 
 
-def _joined(outer: Array, inner: Array) -> Array:
-    return np.hstack([outer[:, :2] @ inner[:, :2], (outer[:, :2] @ inner[:, 2] + outer[:, 2])[:, None]])
-
-
-def _upright(matrix: Array) -> Array:
-    """The same, with y up."""
-    return matrix * np.array([[1.0], [-1.0]])
-
-
-def _number(text: str) -> float:
-    match = _LENGTH.fullmatch(text)
-    if match is None or match[2].lower() not in ("", "px", *_UNITS):
-        return np.nan
-    return float(match[1]) * (_UNITS[match[2].lower()] / _PX if match[2].lower() in _UNITS else 1.0)
-
-
 def _portion(text: str) -> float:
-    match = _LENGTH.fullmatch(text)
+    match = LENGTH.fullmatch(text)
     return float(match[1]) if match else 1.0
 
 
 def _width(text: str) -> float:
-    match = _LENGTH.fullmatch(text)
+    match = LENGTH.fullmatch(text)
     return float(match[1]) if match else 1.0
 
 
@@ -547,144 +500,3 @@ def _painted(style: Mapping[str, str], kind: str, default: str) -> bool:
     if re.fullmatch(r"#(...0|......00)", colour):
         return False
     return not re.fullmatch(r"(rgba?|hsla?)\(.*[,/]0(\.0*)?%?\)", colour) or colour.count(",") == 2
-
-
-def _box(element: Element) -> Array | None:
-    text = element.attributes.get("viewBox")
-    if text is None:
-        return None
-    words = text.replace(",", " ").split()
-    try:
-        box = np.array([float(word) for word in words])
-    except ValueError:
-        box = np.empty(0)
-    if len(box) != 4 or not np.all(np.isfinite(box)) or not np.all(box[2:] > 0):
-        raise InputError("a viewBox is four numbers, width and height positive", value=text)
-    return box
-
-
-def _fitted(box: Array, width: float, height: float, aspect: str) -> Array:
-    """From the units of a viewBox to those around a viewport at the origin."""
-    words = aspect.split()
-    align = words[0] if words else "xMidYMid"
-    sx, sy = width / box[2], height / box[3]
-    if align != "none":
-        sx = sy = max(sx, sy) if "slice" in words else min(sx, sy)
-    room = np.array([width - sx * box[2], height - sy * box[3]])
-    part = np.array(
-        [{"xMin": 0.0, "xMax": 1.0}.get(align[:4], 0.5), {"YMin": 0.0, "YMax": 1.0}.get(align[4:], 0.5)]
-    )
-    shift = part * room if align != "none" else np.zeros(2)
-    return np.array([[sx, 0.0, shift[0] - sx * box[0]], [0.0, sy, shift[1] - sy * box[1]]])
-
-
-def _transform(element: Element, style: Mapping[str, str]) -> Array:
-    """The matrix of an element's transform, from its attribute or style."""
-    for name in ("translate", "rotate", "scale"):
-        if style.get(name, "none").lower() not in ("", "none"):
-            raise ValueError(f"its style has {name}: {style[name]}, which is not read")
-    text = style.get("transform", "").strip()
-    if text.lower() in ("", "none"):
-        return _NO_TURN
-    css = text != element.attributes.get("transform", "").strip()
-    matrix, place = _NO_TURN, 0
-    while text[place:].strip(" \t\r\n,"):
-        match = _FUNCTION.match(text, place)
-        if match is None:
-            raise ValueError(f"its transform is not understood ({text!r})")
-        matrix = _joined(matrix, _function(match[1], match[2].replace(",", " ").split(), css, text))
-        place = match.end()
-    origin = style.get("transform-origin", "").replace(",", " ").split()
-    if not np.all(np.isfinite(matrix)):
-        raise ValueError(f"its transform is not finite ({text!r})")
-    if not origin or all(word in ("0", "left", "top", "0px", "0%") for word in origin):
-        return matrix
-    if style.get("transform-box", "view-box") != "view-box":
-        raise ValueError("its transform-box is not read")
-    if len(origin) > 1 and (origin[0] in ("top", "bottom") or origin[1] in ("left", "right")):
-        origin[:2] = origin[1], origin[0]
-    at = np.array([0.0 if w in ("left", "top") else _number(w) for w in origin[:2]])
-    if len(at) != 2 or not np.all(np.isfinite(at)):
-        raise ValueError(f"its transform-origin is not a point ({' '.join(origin)!r})")
-    there, back = np.hstack([np.eye(2), at[:, None]]), np.hstack([np.eye(2), -at[:, None]])
-    return _joined(_joined(there, matrix), back)
-
-
-_ANGLES = {"deg": 1.0, "rad": 180 / np.pi, "grad": 0.9, "turn": 360.0}
-
-
-def _function(name: str, words: list[str], css: bool, text: str) -> Array:
-    def bad() -> ValueError:
-        return ValueError(f"its transform is not understood ({text!r})")
-
-    def number(word: str, angle: bool, scale: bool = False) -> float:
-        match = _LENGTH.fullmatch(word)
-        if match is None:
-            raise bad()
-        value, unit = float(match[1]), match[2].lower()
-        if angle and unit in _ANGLES:
-            return value * _ANGLES[unit]
-        if scale and unit == "%":
-            return value / 100
-        if not angle and not scale and (unit == "px" or unit in _UNITS):
-            return _number(word)
-        if unit or (css and not scale and value):
-            raise bad()
-        return value
-
-    name = name if css else name.strip()
-    lower = name.lower() if css else name
-    known = {
-        "matrix": (6,), "translate": (1, 2), "scale": (1, 2), "rotate": (1, 3), "skewX": (1,), "skewY": (1,),
-    }  # fmt: skip
-    if css:
-        known = {k.lower(): v for k, v in known.items()}
-        known |= {"translatex": (1,), "translatey": (1,), "scalex": (1,), "scaley": (1,), "skew": (1, 2)}
-    if lower not in known or len(words) not in known[lower]:
-        raise bad()
-    lower = lower.lower()
-    if lower == "matrix":
-        values = [number(word, False, True) for word in words]
-        return np.array(values).reshape(3, 2).T
-    if lower.startswith("translate"):
-        values = [number(word, False) for word in words]
-        values = [0.0, values[0]] if lower == "translatey" else [*values, 0.0]
-        return np.array([[1.0, 0.0, values[0]], [0.0, 1.0, values[1]]])
-    if lower.startswith("scale"):
-        values = [number(word, False, True) for word in words]
-        sx, sy = {"scalex": (values[0], 1.0), "scaley": (1.0, values[0])}.get(lower, (values[0], values[-1]))
-        return np.array([[sx, 0.0, 0.0], [0.0, sy, 0.0]])
-    angle = np.deg2rad(number(words[0], True))
-    if lower == "rotate":
-        c, s = np.cos(angle), np.sin(angle)
-        about = np.array([number(word, False) for word in words[1:]] or [0.0, 0.0])
-        turn = np.array([[c, -s], [s, c]])
-        return np.hstack([turn, (about - turn @ about)[:, None]])
-    other = np.deg2rad(number(words[1], True)) if len(words) > 1 else 0.0
-    across, down = (0.0, angle) if lower == "skewy" else (angle, other)
-    return np.array([[1.0, np.tan(across), 0.0], [np.tan(down), 1.0, 0.0]])
-
-
-def _page_unit(root: Element) -> float | None:
-    """The length of the drawing's unit [m], where its page has a real size."""
-    sides = [_LENGTH.fullmatch(root.attributes.get(key, "")) for key in ("width", "height")]
-    real = [m for m in sides if m and m[2].lower() in _UNITS]
-    box = _box(root)
-    if len(real) < 2 and not (real and box is not None):
-        return None
-    if box is None:
-        version = re.match(r"0\.([0-9]+)", root.attributes.get("inkscape:version", ""))
-        minor = float(f"0.{version[1]}") if version else 1.0
-        return _OLD_PX if minor < 0.92 else _PX
-    scales = [
-        float(side[1]) * _UNITS[side[2].lower()] / extent
-        for side, extent in zip(sides, box[2:].tolist(), strict=True)
-        if side and side[2].lower() in _UNITS
-    ]
-    if not (min(scales) > 0 and max(scales) <= 1.001 * min(scales)):
-        raise InputError(
-            "width, height and viewBox have the same proportions",
-            value=[root.attributes.get(key) for key in ("width", "height", "viewBox")],
-            hint="The drawing is stretched; save it without.",
-        )
-    return scales[0]

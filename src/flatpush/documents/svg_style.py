@@ -11,7 +11,7 @@ INHERITED = (
 # Properties that tell what is seen, and where. A rule of a style sheet that touches none of these is not read.
 GEOMETRY = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "d")
 USED = (
-    *INHERITED, *GEOMETRY, "display", "opacity", "clip-path", "mask", "marker", "overflow",
+    *INHERITED, *GEOMETRY, "display", "opacity", "clip-path", "mask", "filter", "marker", "overflow",
     "transform", "transform-origin", "transform-box", "translate", "rotate", "scale",
 )  # fmt: skip
 # Those that an attribute of the same name does not set, as it means another thing or nothing.
