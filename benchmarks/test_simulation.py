@@ -1,9 +1,15 @@
 """Times of the compiled plant, next to MuJoCo's in the same run: pytest benchmarks/test_simulation.py -n 0 -s.
 
+With FLATPUSH_OLD, a checkout, the single steps of both are measured turn by turn, in CPU time.
+
 Ten thousand open-loop runs of a push of ten seconds, each from its own start and with its own friction, on an ellipsoid
 and on the exact surface of three feet, with one finger and with two. Nothing is asserted about time.
 """
 
+import json
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -28,6 +34,48 @@ def setting(model: str, fingers: int) -> tuple[Plant, np.ndarray]:
         x, y, a = way[-1]
         way.append(np.array([x + SPEED / 30 * np.cos(a), y + SPEED / 30 * np.sin(a), a + SPEED / 30 / 0.3]))
     return plant, np.array(way)
+
+
+STEPS = """
+import json, time
+from benchmarks.test_simulation import setting
+took = {}
+for model in ("ellipsoid", "exact"):
+    for fingers in (1, 2):
+        plant, way = setting(model, fingers)
+        plant.many([[0.0, 0.0, 0.0]] * 100, way)  # compiles, in every version
+        begun, best = plant.start([0, 0, 0], way[0]), float("inf")
+        for _ in range(10):
+            state, since = begun, time.process_time()
+            for _ in range(400):
+                state = plant.step(state, [0.0, 0.01, 0.02], 0.002)
+            best = min(best, (time.process_time() - since) / 400)
+        took[f"{model}, {fingers} finger(s)"] = 1e6 * best
+print(json.dumps(took))
+"""
+
+
+def test_single_steps():
+    """One step of 20 µm of a held object: the time from Python to Python."""
+    new = Path(__file__).parents[1]
+    checkouts = {"this": new} | (
+        {"old": Path(os.environ["FLATPUSH_OLD"])} if "FLATPUSH_OLD" in os.environ else {}
+    )
+    took = {}
+    for _ in range(3):
+        for name, checkout in checkouts.items():
+            environment = os.environ | {"PYTHONPATH": f"{checkout / 'src'}{os.pathsep}{new}"}
+            command = [sys.executable, "-c", STEPS]
+            ran = subprocess.run(
+                command, env=environment, cwd="/", capture_output=True, text=True, check=True
+            )
+            for case, micros in json.loads(ran.stdout).items():
+                took.setdefault(case, {}).setdefault(name, []).append(micros)
+    for case, times in took.items():
+        text = ", ".join(f"{name} {min(values):.1f} µs" for name, values in times.items())
+        ratio = f", ratio {min(times['this']) / min(times['old']):.2f}" if "old" in times else ""
+        print(f"\nPlant.step, {case}: {text}{ratio}", end="")
+    assert took
 
 
 def disturbed() -> tuple[np.ndarray, np.ndarray]:

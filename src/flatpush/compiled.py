@@ -288,8 +288,8 @@ def _itself(function: Callable[..., object]) -> Callable[..., object]:
     return source
 
 
-def _way_of(ways: Mapping[type, Callable[..., object]]) -> Callable[..., object]:
-    def source(first: nb.types.BaseNamedTuple, *_: object) -> Callable[..., object]:
-        return ways[first.instance_class]
+def _way_of(ways: Mapping[Any, Callable[..., object]]) -> Callable[..., object]:
+    def source(first: Any, *_: object) -> Callable[..., object]:
+        return ways[first.dtype.dtype if isinstance(first, types.Array) else first.instance_class]
 
     return source

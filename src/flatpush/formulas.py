@@ -10,7 +10,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 FORMULAS: list[Callable[..., object]] = []
-CHOICES: list[tuple[Callable[..., object], Mapping[type, Callable[..., object]]]] = []
+CHOICES: list[tuple[Callable[..., object], Mapping[object, Callable[..., object]]]] = []
 
 
 def formula(function: Callable[P, R]) -> Callable[P, R]:
@@ -19,8 +19,11 @@ def formula(function: Callable[P, R]) -> Callable[P, R]:
     return function
 
 
-def by_type(ways: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
-    """The function that goes the way of its first argument's class, a NamedTuple; a kernel compiles only that way."""
+def by_type(ways: Mapping[Any, Callable[..., Any]]) -> Callable[..., Any]:
+    """The function that goes the way of its first argument's class, a NamedTuple, or, of rows in a kernel, their dtype.
+
+    A kernel compiles only that way.
+    """
 
     def chosen(first: object, *others: object) -> object:
         return ways[type(first)](first, *others)

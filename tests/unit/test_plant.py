@@ -8,7 +8,7 @@ from flatpush.contact import PointContact
 from flatpush.errors import InputError
 from flatpush.friction import Exact, LimitSurface
 from flatpush.simulation.plant import MODES, Plant, steps
-from flatpush.simulation.plant import plant as module
+from flatpush.simulation.plant import runner as module
 from flatpush.simulation.plant.arrays import interpreted, outline_arrays, surface_arrays
 from flatpush.simulation.plant.contact_modes import one
 from flatpush.simulation.plant.resistance import stick_of, twist_of, wrench_of

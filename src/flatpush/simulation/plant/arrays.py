@@ -1,8 +1,8 @@
 """Limit surfaces, outlines and poses as data with names, for the plant's steps.
 
-Every class comes in three kinds with the same names: of one run, with plain numbers and sequences of rows, which Python
-reads quickly; of one run in a kernel, with numbers and record arrays; and of many runs, with an array of one number for
-each run, and the rows of all runs one after the other.
+Every class comes in two kinds with the same names: with plain numbers and sequences of rows, which Python reads
+quickly, and in a kernel, with numbers and record arrays. A kernel is given record arrays alone and makes the classes of
+them, since passing a NamedTuple to a kernel costs more than a step of the plant.
 """
 
 from collections.abc import Sequence
@@ -56,27 +56,33 @@ SIDE = _record(
 )  # a straight piece of a support: direction, ends along it, distance
 ELLIPSE = _record("xx xy xt yy yt tt ixx ixy ixt iyy iyt itt")  # the symmetric matrix A, and its inverse
 TERMS = _record("xxxx yyyy zzzz xxxy xxxz yyyx yyyz zzzx zzzy xxyy xxzz yyzz xxyz yyxz zzxy")
+OUTLINE = _record("x y radius size tip", "circle convex")  # OutlineArrays but the edges, and the tips' radius
+COURSE = _record("", "first last surfaces hands number begin kind rows push_out")
+# Of runs first to last: how many surfaces there are (one, or one for each run), how many hands, poses of each, the pose
+# that is gone to first (1: the state at the first is known), how they go from one to the next (codes.STRAIGHT and
+# others), poses of the object that are kept of each run (1 or all), whether it is moved out of the fingers first.
+RUN = _record("x y angle", "status reached")  # where the object starts; how the run ended, poses reached
 
 
 class EllipsoidArrays(NamedTuple):
     """unit: of length ℓ [m]. ellipse: one ELLIPSE row; A in ℓ, of trace 3."""
 
-    unit: Any
+    unit: float
     ellipse: Rows
 
 
 class QuarticArrays(NamedTuple):
     """unit: of length ℓ [m]. terms: one TERMS row; coefficients by their monomials, balanced."""
 
-    unit: Any
+    unit: float
     terms: Rows
 
 
 class FeetArrays(NamedTuple):
     """unit: of length ℓ [m]. radius: of the support [ℓ]. feet: FOOT rows, about the COF, lengths in ℓ."""
 
-    unit: Any
-    radius: Any
+    unit: float
+    radius: float
     feet: Rows
 
 
@@ -88,12 +94,12 @@ class SidesArrays(NamedTuple):
     nodes: FOOT rows that stand for it from far away.
     """
 
-    unit: Any
-    radius: Any
-    filled: Any
-    size: Any
-    x: Any
-    y: Any
+    unit: float
+    radius: float
+    filled: bool
+    size: float
+    x: float
+    y: float
     sides: Rows
     nodes: Rows
 
@@ -101,15 +107,29 @@ class SidesArrays(NamedTuple):
 class RoundArrays(NamedTuple):
     """A uniform pressure on a circle, or inside it: as SidesArrays."""
 
-    unit: Any
-    radius: Any
-    filled: Any
-    x: Any
-    y: Any
+    unit: float
+    radius: float
+    filled: bool
+    x: float
+    y: float
     nodes: Rows
 
 
 SurfaceArrays = EllipsoidArrays | QuarticArrays | FeetArrays | SidesArrays | RoundArrays
+
+
+def _body(*columns: str) -> np.dtype:
+    return _record(" ".join(("cof_x cof_y friction unit", *columns)))
+
+
+BODIES: dict[type[SurfaceArrays], np.dtype] = {
+    EllipsoidArrays: _body(*(ELLIPSE.names or ())),
+    QuarticArrays: _body(*(TERMS.names or ())),
+    FeetArrays: _body("radius"),
+    SidesArrays: _body("radius filled size x y"),
+    RoundArrays: _body("radius filled x y"),
+}
+"""What a run has of its own, in one row for each kind of surface: Setting's numbers, and the surface's."""
 
 
 class OutlineArrays(NamedTuple):
@@ -130,7 +150,7 @@ class OutlineArrays(NamedTuple):
 class Setting(NamedTuple):
     """What a run does not change. cof_x, cof_y: in O. radius: of the fingertips. fingers: POINT rows in E."""
 
-    surface: Any
+    surface: SurfaceArrays
     cof_x: float
     cof_y: float
     outline: OutlineArrays
@@ -139,28 +159,12 @@ class Setting(NamedTuple):
     fingers: Rows
 
 
-class ManySettings(NamedTuple):
-    """The settings of many runs: surfaces of many runs, POINT rows `cofs` and `frictions`, one for all or one each."""
+class RunArrays(NamedTuple):
+    """Rows of BODIES, one for all runs or one each; FOOT and SIDE rows of their surfaces, one after the other."""
 
-    surfaces: Any
-    cofs: Rows
-    outline: OutlineArrays
-    frictions: Array
-    radius: float
-    fingers: Rows
-
-
-class Course(NamedTuple):
-    """The way of the hands: how many, poses of each, how they go from one to the next (codes.STRAIGHT and others).
-
-    rows: poses of the object that are kept of each run, 1 or all. push_out: whether it is moved out of the fingers.
-    """
-
-    hands: int
-    number: int
-    kind: int
-    rows: int
-    push_out: bool
+    bodies: Rows
+    feet: Rows
+    sides: Rows
 
 
 class Move(NamedTuple):
@@ -187,15 +191,23 @@ class Scratch(NamedTuple):
     now: Rows
 
 
-_COUNTS = {"contacts": (CONTACT, 4), "rays": (RAY, 4), "planes": (RAY, 12), "q": (POSE, 1)}
+SCRATCH = np.dtype(
+    [
+        ("contacts", CONTACT, 4),
+        ("rays", RAY, 4),
+        ("planes", RAY, 12),
+        ("q", POSE, 1),
+        ("hands", POSE, 2),
+        ("steps", POSE, 2),
+        ("now", SEEN, 2),
+    ]
+)
 
 
-def scratch(fingers: int, interpreted: bool) -> Scratch:
-    """Room for the steps of some fingers."""
-    rooms = _COUNTS | {"hands": (POSE, fingers), "steps": (POSE, fingers), "now": (SEEN, fingers)}
-    if interpreted:
-        return Scratch(**{name: blank(dtype, count) for name, (dtype, count) in rooms.items()})
-    return Scratch(**{name: np.zeros(count, dtype) for name, (dtype, count) in rooms.items()})
+def scratch() -> Scratch:
+    """Room for the steps of one or two fingers, interpreted."""
+    rooms = {name: SCRATCH[name].subdtype or (SCRATCH[name], (1,)) for name in Scratch._fields}
+    return Scratch(**{name: blank(dtype, count) for name, (dtype, (count,)) in rooms.items()})
 
 
 def blank(dtype: np.dtype, count: int) -> list[Row]:
@@ -226,20 +238,38 @@ def interpreted(arrays: Any) -> Any:
     return type(arrays)(*values)
 
 
-def of_many(surfaces: Sequence[SurfaceArrays]) -> SurfaceArrays | None:
-    """Surfaces of one kind and size as one of many runs; None if they are not."""
-    first = surfaces[0]
-    if any(type(s) is not type(first) for s in surfaces):
+def run_arrays(surfaces: Sequence[SurfaceArrays], cofs: Array, frictions: Array) -> RunArrays | None:
+    """What a kernel is given of the runs' own: surfaces, centres (n, 2), frictions (n,), each one for all or of each.
+
+    Returns None if the surfaces are not of one kind and size.
+    """
+    kind = type(surfaces[0])
+    if any(type(s) is not kind for s in surfaces):
         return None
-    columns = []
-    for values in zip(*surfaces, strict=True):
-        if not isinstance(values[0], np.ndarray):
-            columns.append(np.array(values))
-        elif len({len(v) for v in values}) == 1:
-            columns.append(np.concatenate(values))
-        else:
-            return None
-    return type(first)(*columns)
+    numbers: list[list[float]] = []
+    feet: list[Array] = []
+    sides: list[Array] = []
+    for surface in surfaces:
+        row: list[float] = []
+        for value in surface:
+            if not isinstance(value, np.ndarray):
+                row.append(value)
+            elif value.dtype in (FOOT, SIDE):
+                (feet if value.dtype == FOOT else sides).append(value)
+            else:
+                row += value[0].tolist()
+        numbers.append(row)
+    if len({len(v) for v in feet}) > 1 or len({len(v) for v in sides}) > 1:
+        return None
+    n = max(len(surfaces), len(cofs), len(frictions))
+    columns = [
+        np.broadcast_to(v, (n, v.shape[1])) for v in (cofs, frictions[:, None], np.array(numbers, float))
+    ]
+    return RunArrays(
+        records(BODIES[kind], np.concatenate(columns, axis=1)),
+        np.concatenate(feet) if feet else np.zeros(0, FOOT),
+        np.concatenate(sides) if sides else np.zeros(0, SIDE),
+    )
 
 
 def compilable(surface: LimitSurface) -> bool:

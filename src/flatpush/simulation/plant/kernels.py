@@ -1,14 +1,17 @@
 """The plant's runs, compiled: for each kind of limit surface when it is first needed."""
 
-from typing import Any
-
 from ...compiled import kernel
 from ...formulas import by_type, formula
+from ...geometry.pose import Array
 from .arrays import (
-    Course,
+    BODIES,
+    POSE,
+    RUN,
+    SCRATCH,
+    SEEN,
     EllipsoidArrays,
     FeetArrays,
-    ManySettings,
+    OutlineArrays,
     QuarticArrays,
     RoundArrays,
     Rows,
@@ -20,76 +23,80 @@ from .steps import follow, push_out
 
 
 @formula
-def _ellipsoid(surfaces: EllipsoidArrays, r: int) -> EllipsoidArrays:
-    return EllipsoidArrays(surfaces.unit[r], surfaces.ellipse[r : r + 1])
+def _ellipsoid(bodies: Rows, feet: Rows, sides: Rows) -> EllipsoidArrays:
+    return EllipsoidArrays(bodies[0].unit, bodies)
 
 
 @formula
-def _quartic(surfaces: QuarticArrays, r: int) -> QuarticArrays:
-    return QuarticArrays(surfaces.unit[r], surfaces.terms[r : r + 1])
+def _quartic(bodies: Rows, feet: Rows, sides: Rows) -> QuarticArrays:
+    return QuarticArrays(bodies[0].unit, bodies)
 
 
 @formula
-def _feet(surfaces: FeetArrays, r: int) -> FeetArrays:
-    n = len(surfaces.feet) // len(surfaces.unit)
-    return FeetArrays(surfaces.unit[r], surfaces.radius[r], surfaces.feet[r * n : r * n + n])
+def _feet(bodies: Rows, feet: Rows, sides: Rows) -> FeetArrays:
+    return FeetArrays(bodies[0].unit, bodies[0].radius, feet)
 
 
 @formula
-def _sides(surfaces: SidesArrays, r: int) -> SidesArrays:
-    s = surfaces
-    n, m = len(s.sides) // len(s.unit), len(s.nodes) // len(s.unit)
-    sides, nodes = s.sides[r * n : r * n + n], s.nodes[r * m : r * m + m]
-    return SidesArrays(s.unit[r], s.radius[r], s.filled[r], s.size[r], s.x[r], s.y[r], sides, nodes)
+def _sides(bodies: Rows, feet: Rows, sides: Rows) -> SidesArrays:
+    b = bodies[0]
+    return SidesArrays(b.unit, b.radius, b.filled != 0.0, b.size, b.x, b.y, sides, feet)
 
 
 @formula
-def _round(surfaces: RoundArrays, r: int) -> RoundArrays:
-    s = surfaces
-    n = len(s.nodes) // len(s.unit)
-    return RoundArrays(s.unit[r], s.radius[r], s.filled[r], s.x[r], s.y[r], s.nodes[r * n : r * n + n])
+def _round(bodies: Rows, feet: Rows, sides: Rows) -> RoundArrays:
+    b = bodies[0]
+    return RoundArrays(b.unit, b.radius, b.filled != 0.0, b.x, b.y, feet)
 
 
-surface_of_run = by_type(
-    {
-        EllipsoidArrays: _ellipsoid,
-        QuarticArrays: _quartic,
-        FeetArrays: _feet,
-        SidesArrays: _sides,
-        RoundArrays: _round,
-    }
-)
+_WAYS = {
+    EllipsoidArrays: _ellipsoid,
+    QuarticArrays: _quartic,
+    FeetArrays: _feet,
+    SidesArrays: _sides,
+    RoundArrays: _round,
+}
+_surface = by_type({BODIES[kind]: way for kind, way in _WAYS.items()})
 
 
 @kernel(lent=True)
 def many(
-    first: int,
-    last: int,
-    settings: ManySettings,
-    starts: Rows,
-    poses: Rows,
-    course: Course,
-    out: Rows,
-    seen: Rows,
-    status: Any,
-    reached: Any,
-    scratch: Scratch,
+    course: Rows,
+    bodies: Rows,
+    feet: Rows,
+    sides: Rows,
+    outlines: Rows,
+    edges: Rows,
+    fingers: Rows,
+    runs_: Array,
+    poses_: Array,
+    out_: Array,
+    seen_: Array,
+    scratch_: Array,
 ) -> None:
-    """steps.follow for the runs first to last, from the poses X_WO in `starts`.
+    """steps.follow for the RUN rows `runs_` that the COURSE row says, and writes how they ended.
 
-    Surfaces, centres, frictions and the hands' poses are one for all or one for each run; rows of `out` and `seen`
-    follow one another, run by run.
+    Bodies, surfaces and the hands' poses are one for all or one for each run; rows of `out_` and `seen_` follow one
+    another, run by run. Of `course`, `outlines` (OUTLINE) and `scratch_` (SCRATCH) there is one row. What differs from
+    call to call comes as plain numbers (in a row), which are passed more quickly than records.
     """
-    surfaces, cofs, mus = settings.surfaces, settings.cofs, settings.frictions
-    fingers, length = settings.fingers, course.hands * course.number
-    for r in range(first, last):
-        surface = surface_of_run(surfaces, r if len(surfaces.unit) > 1 else 0)
-        cof = cofs[r if len(cofs) > 1 else 0]
-        mu = mus[r if len(mus) > 1 else 0]
-        setting = Setting(surface, cof.x, cof.y, settings.outline, mu, settings.radius, fingers)
-        way = poses[r * length : r * length + length] if len(poses) > length else poses
-        if course.push_out:
-            push_out(setting, starts[r], way[: course.hands], scratch)
-        to, look = out[r * course.rows : (r + 1) * course.rows], course.rows * len(fingers)
-        there = seen[r * look : (r + 1) * look]
-        status[r], reached[r] = follow(setting, starts[r], way, course.hands, course.kind, to, there, scratch)
+    runs, poses, out, seen = runs_.view(RUN), poses_.view(POSE), out_.view(POSE), seen_.view(SEEN)
+    how, thing, room = course[0], outlines[0], scratch_.view(SCRATCH)[0]
+    outline = OutlineArrays(
+        thing.circle != 0, thing.x, thing.y, thing.radius, thing.convex != 0, thing.size, edges
+    )
+    space = Scratch(room.contacts, room.rays, room.planes, room.q, room.hands, room.steps, room.now)
+    length, look = how.hands * how.number, how.rows * len(fingers)
+    nf, ns = len(feet) // how.surfaces, len(sides) // how.surfaces
+    for r in range(how.first, how.last):
+        b, k = (r if len(bodies) > 1 else 0), (r if how.surfaces > 1 else 0)
+        body = bodies[b]
+        surface = _surface(bodies[b : b + 1], feet[k * nf : (k + 1) * nf], sides[k * ns : (k + 1) * ns])
+        setting = Setting(surface, body.cof_x, body.cof_y, outline, body.friction, thing.tip, fingers)
+        way = poses[r * length : (r + 1) * length] if len(poses) > length else poses
+        if how.push_out != 0:
+            push_out(setting, runs[r], way[: how.hands], space)
+        to, there = out[r * how.rows : (r + 1) * how.rows], seen[r * look : (r + 1) * look]
+        runs[r].status, runs[r].reached = follow(
+            setting, runs[r], way, how.hands, how.begin, how.kind, to, there, space
+        )

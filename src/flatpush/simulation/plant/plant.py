@@ -1,10 +1,8 @@
 """An object and the fingers that push it, moved step by step."""
 
-import os
+import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,31 +13,8 @@ from ...geometry.pose import Array
 from ...problem import Object
 from ...problem.mechanics import surface_of
 from ...problem.scene import Model
-from . import runs, steps
-from .arrays import (
-    POINT,
-    POSE,
-    SEEN,
-    Course,
-    ManySettings,
-    SeenRows,
-    Setting,
-    SurfaceArrays,
-    blank,
-    compilable,
-    interpreted,
-    of_many,
-    outline_arrays,
-    plain_rows,
-    records,
-    scratch,
-    surface_arrays,
-)
-from .codes import AS_IT_IS, BODY, LEFT, MANY, MODES, OUTCOMES, RIGHT, STRAIGHT, UNDECIDED
-from .plain import Fingers
-
-Codes = NDArray[np.integer]
-
+from .codes import AS_IT_IS, BODY, LEFT, MODES, OUTCOMES, RIGHT, STRAIGHT
+from .runner import Codes, Done, Runner, Task
 
 FARTHEST = (
     1e3  # fingertips from their hand, by the outline's size: a turn moves them by as many steps of the plant
@@ -165,10 +140,8 @@ class Plant:
         self.surface = surface if surface is not None else surface_of(thing, model, np.array([1.0, 0.0]))
         self.fingers, self.tip_radius = tips, float(tip_radius)
         self.cof = _vector(thing.cof if cof is None else cof, 2, "a centre of friction")
-        self._plain = plain or len(tips) > 2 or not compilable(self.surface)
-        self._arrays = None if self._plain else surface_arrays(self.surface)
-        self._shared = None if self._arrays is None else of_many([self._arrays])
-        self._outline, self._points = outline_arrays(thing.outline), records(POINT, tips)
+        self._size = thing.outline.size
+        self._runner = Runner(thing.outline, self.surface, self.cof, mu, self.tip_radius, tips, plain)
 
     def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
         """The state with the object at X_WO and the hand at X_WE, (3,) or one for each finger (k, 3).
@@ -177,7 +150,9 @@ class Plant:
         "starts inside".
         """
         hands = self._hands(hand)
-        done = self._run(_vector(object_, 3, "a pose")[None], hands[None, None], AS_IT_IS, push_out)
+        done = self._runner.run(
+            Task(_vector(object_, 3, "a pose")[None], hands[None, None], AS_IT_IS, push_out)
+        )
         return self._state(done, np.ndim(hand) == 2)
 
     def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
@@ -185,17 +160,23 @@ class Plant:
 
         E's origin goes straight. Fingertips turn with their hand.
         """
-        if not (np.isfinite(dt) and dt >= 0):
+        if not (math.isfinite(dt) and dt >= 0):
             raise InputError("a time step is a finite number, 0 or more", value=dt)
-        hands = np.array(state.hand, dtype=float).reshape(-1, 3)
-        step = np.atleast_2d(np.array(velocity, dtype=float)) * dt
-        if step.shape != hands.shape or not np.isfinite(step).all():
+        step = np.array(velocity, dtype=float, ndmin=2)
+        if step.shape != (state.hand.size // 3, 3):
             raise InputError("a velocity is three finite numbers for each hand", value=velocity)
-        self._refuse_too_long(np.abs(step) * [1.0, 1.0, self._outline.size])
+        step *= dt
+        for x, y, turn in step.tolist():  # quicker than arrays for so few
+            if not abs(x) + abs(y) + abs(turn) * self._size <= LONGEST * self._size:
+                if not np.isfinite(step).all():
+                    raise InputError("a velocity is three finite numbers for each hand", value=velocity)
+                self._refuse_too_long(np.abs(step) @ [1.0, 1.0, self._size])
         if state.outcome:
             return state
-        done = self._run(state.object[None], np.stack([hands, hands + step])[None], AS_IT_IS)
-        return self._state(done, state.hand.ndim == 2)
+        hands = np.empty((2, *step.shape))
+        hands[0] = state.hand
+        np.add(state.hand, step, out=hands[1])
+        return self._state(self._runner.step(state.object, hands), state.hand.ndim == 2)
 
     def follow(
         self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True, body: bool = False
@@ -208,15 +189,15 @@ class Plant:
         """
         hands = self._way(hand)
         q = _vector(object_, 3, "a pose")
-        done = self._run(q[None], hands[None], BODY if body else STRAIGHT, push_out, len(hands))
-        seen = done.seen[0]
+        done = self._runner.run(Task(q[None], hands[None], BODY if body else STRAIGHT, push_out, len(hands)))
+        status, reached = done.ends[0].tolist()
         return PlantRun(
             done.poses[0],
-            seen["mode"].astype(np.int8),
-            _points(seen),
-            seen["gap"],
-            OUTCOMES[done.outcome[0]],
-            int(done.reached[0]),
+            done.modes[0, ..., 0].astype(np.int8),
+            done.points[0],
+            done.gaps[0],
+            OUTCOMES[status],
+            reached,
         )
 
     def many(
@@ -261,12 +242,14 @@ class Plant:
             raise InputError("friction is 0 or more", value=float(mus.min()))
         rows = hands.shape[1] if record else 1
         kind = BODY if body else STRAIGHT
-        done = self._run(objects, hands, kind, push_out, rows, mus, centres, surfaces, threads)
-        stuck = ~np.any(done.seen["modes"] & (1 << LEFT | 1 << RIGHT), axis=(1, 2))
+        task = Task(objects, hands, kind, push_out, rows, 0, mus, centres, surfaces)
+        done = self._runner.run(task, threads)
+        outcome = done.ends[:, 0].copy()
+        stuck = ~np.any(done.modes[..., 1] & (1 << LEFT | 1 << RIGHT), axis=(1, 2))
         if not record:
-            return PlantRuns(done.poses[:, -1], done.outcome, stuck)
-        modes = done.seen["mode"].astype(np.int8)
-        return PlantRuns(done.poses[:, -1], done.outcome, stuck, done.poses, modes, _points(done.seen))
+            return PlantRuns(done.poses[:, -1], outcome, stuck)
+        modes = done.modes[..., 0].astype(np.int8)
+        return PlantRuns(done.poses[:, -1], outcome, stuck, done.poses, modes, done.points)
 
     def _hands(self, hand: ArrayLike) -> Array:
         hands = np.atleast_2d(np.array(hand, dtype=float))
@@ -285,165 +268,16 @@ class Plant:
         return np.ascontiguousarray(way)
 
     def _refuse_too_long(self, ways: Array) -> None:
-        if ways.max(initial=0.0) > LONGEST * self._outline.size:
+        if ways.max(initial=0.0) > LONGEST * self._size:
             raise InputError(
                 f"a hand goes at most {LONGEST:g} times the object's size in one run", value=float(ways.max())
             )
 
-    def _run(
-        self,
-        starts: Array,
-        hands: Array,
-        kind: int,
-        push_out: bool = False,
-        rows: int = 1,
-        mus: Array | None = None,
-        cofs: Array | None = None,
-        surfaces: Sequence[LimitSurface] | None = None,
-        threads: int | None = None,
-    ) -> "_Done":
-        """Runs from starts (n, 3) under hands (n or 1, m, h, 3); what is None is the plant's own."""
-        n, k = len(starts), len(self.fingers)
-        mus = np.array([self.friction]) if mus is None else mus
-        cofs = self.cof[None] if cofs is None else cofs
-        poses, seen = np.empty((n, rows, 3)), np.zeros((n, rows, k), SEEN)
-        done = _Done(poses, seen, np.full(n, MANY), np.zeros(n, np.int64), hands[-1, 0].copy())
-        packed = None if self._arrays is None else [self._arrays]
-        if packed and surfaces is not None:
-            packed = [surface_arrays(s) for s in surfaces] if all(map(compilable, surfaces)) else None
-        if packed and n:
-            work = 0.0 if type(packed[0]) in _ready else n * self._work(hands)
-            _patience[0] -= work
-            if type(packed[0]) in _ready or _patience[0] < 0:
-                self._compiled(starts, hands, kind, push_out, mus, cofs, packed, threads, done)
-            else:
-                self._interpreted(starts, hands, kind, push_out, mus, cofs, packed, done)
-        for r in np.flatnonzero(done.outcome >= MANY).tolist():
-            surface = self.surface if surfaces is None else surfaces[r % len(surfaces)]
-            mu, cof = float(mus[r % len(mus)]), cofs[r % len(cofs)]
-            written = Fingers(self.thing.outline, surface, cof, mu, self.tip_radius, self.fingers)
-            q, way = starts[r].copy(), hands[r % len(hands)]
-            if push_out:
-                runs.push_out(written, q, way[0])
-            done.outcome[r], done.reached[r], done.hands[:] = runs.follow(
-                written, q, way, kind, poses[r], seen[r]
-            )
-        return done
-
-    def _work(self, hands: Array) -> float:
-        """Steps that a run takes at least."""
-        turn = np.max(np.hypot(*self.fingers.T)) + self._outline.size
-        ways = np.abs(np.diff(hands, axis=1)) @ [1.0, 1.0, turn] / (steps.STEP * self._outline.size)
-        return float(np.max(np.sum(np.maximum(1.0, ways), axis=(1, 2)), initial=1.0))
-
-    def _interpreted(
-        self,
-        starts: Array,
-        hands: Array,
-        kind: int,
-        push_out: bool,
-        mus: Array,
-        cofs: Array,
-        packed: Sequence[SurfaceArrays],
-        done: "_Done",
-    ) -> None:
-        room = scratch(len(self.fingers), True)
-        count, rows = hands.shape[2], done.poses.shape[1]
-        ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in hands]
-        surfaces = [interpreted(arrays) for arrays in packed]
-        outline, fingers = interpreted(self._outline), plain_rows(self._points)
-        out, seen = blank(POSE, rows), blank(SEEN, rows * len(fingers))
-        start = blank(POSE, 1)[0]
-        for r, pose in enumerate(starts.tolist()):
-            mu, (x, y) = float(mus[r % len(mus)]), cofs[r % len(cofs)].tolist()
-            surface, way = surfaces[r % len(surfaces)], ways[r % len(ways)]
-            setting = Setting(surface, x, y, outline, mu, self.tip_radius, fingers)
-            start.x, start.y, start.angle = pose
-            try:
-                if push_out:
-                    steps.push_out(setting, start, way[:count], room)
-                done.outcome[r], done.reached[r] = steps.follow(
-                    setting, start, way, count, kind, out, seen, room
-                )
-            except (ArithmeticError, ValueError):  # where the compiled formulas go on with inf or nan
-                done.outcome[r] = UNDECIDED
-                continue
-            done.poses[r] = [(q.x, q.y, q.angle) for q in out]
-            done.seen[r].flat = [(s.x, s.y, s.gap, s.mode, s.modes) for s in seen]
-            done.hands[:] = [(h.x, h.y, h.angle) for h in room.hands[:count]]
-
-    def _compiled(
-        self,
-        starts: Array,
-        hands: Array,
-        kind: int,
-        push_out: bool,
-        mus: Array,
-        cofs: Array,
-        packed: Sequence[SurfaceArrays],
-        threads: int | None,
-        done: "_Done",
-    ) -> None:
-        from .kernels import many
-
-        surfaces = self._shared if packed[0] is self._arrays else of_many(packed)
-        if surfaces is None:
-            raise InputError("the surfaces of many runs are of one kind and size")
-        n, (_, number, count, _) = len(starts), hands.shape
-        settings = ManySettings(
-            surfaces,
-            records(POINT, cofs),
-            self._outline,
-            mus,
-            self.tip_radius,
-            self._points,
-        )
-        course = Course(count, number, kind, done.poses.shape[1], push_out)
-        begun, way = records(POSE, starts.copy()), records(POSE, hands.reshape(-1, 3))
-        out, seen = done.poses.reshape(-1, 3).view(POSE).reshape(-1), done.seen.reshape(-1)
-        workers = 1 if n == 1 else threads or os.cpu_count() or 1
-        size = max(1, -(-n // (4 * workers)))
-
-        def chunk(first: int) -> Array:
-            room = scratch(len(self.fingers), False)
-            last = min(first + size, n)
-            many(first, last, settings, begun, way, course, out, seen, done.outcome, done.reached, room)
-            return room.hands
-
-        last = chunk(0)  # compiles, if need be, in one thread
-        _ready.add(type(surfaces))
-        if n > size:
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(chunk, range(size, n, size)))
-        done.hands[:] = last.view(np.float64).reshape(-1, 3)[:count]
-
-    def _state(self, done: "_Done", separate: bool) -> PlantState:
-        seen = done.seen[0, 0]
-        modes = tuple(MODES[code] for code in seen["mode"])
+    def _state(self, done: Done, separate: bool) -> PlantState:
+        modes = tuple([MODES[code] for code in done.modes[0, 0, :, 0].tolist()])
         hand = done.hands if separate else done.hands[0]
-        return PlantState(
-            done.poses[0, 0], hand, modes, _points(seen), seen["gap"].copy(), OUTCOMES[done.outcome[0]]
-        )
-
-
-class _Done(NamedTuple):
-    """Runs: X_WO (n, rows, 3), SEEN rows (n, rows, k), codes and poses reached (n,), last poses of the hands (h, 3)."""
-
-    poses: Array
-    seen: SeenRows
-    outcome: Codes
-    reached: Codes
-    hands: Array
-
-
-# Steps that this process may still interpret before it compiles the kernels (a step takes about a millisecond then,
-# compiling takes longer than all of them), and the kinds of surface for which it has.
-_patience = [3000.0]
-_ready: set[type] = set()
-
-
-def _points(seen: SeenRows) -> Array:
-    return np.stack([seen["x"], seen["y"]], axis=-1)
+        outcome = OUTCOMES[done.ends[0, 0]]
+        return PlantState(done.poses[0, 0], hand, modes, done.points[0, 0], done.gaps[0, 0], outcome)
 
 
 def _vector(values: ArrayLike, size: int, what: str) -> Array:

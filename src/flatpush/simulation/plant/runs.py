@@ -20,7 +20,7 @@ def push_out(fingers: Fingers, q: Array, hands: Array) -> None:
 
 
 def follow(
-    fingers: Fingers, q: Array, poses: Array, kind: int, out: Array, seen: SeenRows
+    fingers: Fingers, q: Array, poses: Array, begin: int, kind: int, out: Array, seen: SeenRows
 ) -> tuple[int, int, Array]:
     """steps.follow from X_WO q (3,): poses (m, h, 3), out (rows, 3), seen SEEN rows (rows, k).
 
@@ -32,7 +32,7 @@ def follow(
     modes: list[str] = []
     ways: list[set[str]] = []
     seen["modes"] = 0
-    for m in range(len(poses)):
+    for m in range(begin, len(poses)):
         if not status:
             if m and kind == BODY:
                 step = np.atleast_2d(log(compose(inverse(hands), poses[m])))

@@ -510,13 +510,22 @@ def _set_step(step: Row, hand: Row, to: Row, kind: int) -> None:
 
 @formula
 def follow(
-    setting: Setting, start: Row, poses: Rows, count: int, kind: int, out: Rows, seen: Rows, scratch: Scratch
+    setting: Setting,
+    start: Row,
+    poses: Rows,
+    count: int,
+    begin: int,
+    kind: int,
+    out: Rows,
+    seen: Rows,
+    scratch: Scratch,
 ) -> Any:
     """The object under hands that go from pose to pose.
 
     Args:
         start: X_WO at the first pose.
         poses: of `count` hands, one pose of each after the other.
+        begin: the pose that is gone to first: 0, or 1 where the state at the first is known.
         kind: codes.STRAIGHT, BODY or AS_IT_IS.
         out: POSE rows, X_WO at each pose of the hands, or one row: only the last.
         seen: SEEN rows, one for each finger at each pose, or at the last, then with the modes of the whole way.
@@ -535,7 +544,7 @@ def follow(
     for i in range(len(seen)):
         seen[i].modes = 0
     status, reached, number = GOING, 0, len(poses) // count
-    for m in range(number):
+    for m in range(begin, number):
         if status == GOING:
             if m > 0:
                 for k in range(count):

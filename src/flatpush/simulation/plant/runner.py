@@ -1,0 +1,253 @@
+"""Who makes a plant's runs: the compiled steps, the same steps interpreted while there are few, or the plain plant."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...friction.surface import LimitSurface
+from ...geometry import Outline
+from ...geometry.pose import Array
+from . import runs, steps
+from .arrays import (
+    COURSE,
+    OUTLINE,
+    POINT,
+    POSE,
+    SCRATCH,
+    SEEN,
+    RunArrays,
+    Setting,
+    SurfaceArrays,
+    blank,
+    compilable,
+    interpreted,
+    outline_arrays,
+    plain_rows,
+    records,
+    run_arrays,
+    scratch,
+    surface_arrays,
+)
+from .codes import AS_IT_IS, MANY, STRAIGHT, UNDECIDED
+from .plain import Fingers
+
+Codes = NDArray[np.integer]
+
+# Steps that this process may still interpret before it compiles the kernels (a step takes about a millisecond then,
+# compiling takes longer than all of them), and the kinds of surface for which it has.
+_patience = [3000.0]
+_ready: set[type] = set()
+
+
+# Numbers in rows, and where the hands begin in the scratch.
+_SEEN, _SCRATCH = SEEN.itemsize // 8, SCRATCH.itemsize // 8
+_HANDS = sum(SCRATCH[name].itemsize for name in ("contacts", "rays", "planes", "q")) // 8
+
+
+class Task(NamedTuple):
+    """Runs to be made.
+
+    starts: X_WO (n, 3). hands: X_WE of h hands (n or 1, m, h, 3). kind: codes.STRAIGHT and others. push_out: whether
+    the object is moved out of the fingers first. rows: poses of the object that are kept, m or 1. begin: the pose of
+    the hands that is gone to first, 1 where the state at the first is known.
+    frictions (n or 1,), cofs (n or 1, 2), surfaces: of each run or one for all; None: the plant's own.
+    """
+
+    starts: Array
+    hands: Array
+    kind: int = STRAIGHT
+    push_out: bool = False
+    rows: int = 1
+    begin: int = 0
+    frictions: Array | None = None
+    cofs: Array | None = None
+    surfaces: Sequence[LimitSurface] | None = None
+
+
+class Done(NamedTuple):
+    """Runs: X_WO (n, rows, 3), SEEN rows as numbers (n, rows, k, 5), codes of the outcomes and numbers of poses reached
+    (n, 2), and the last poses of the hands (h, 3) of one of them."""
+
+    poses: Array
+    seen: Array
+    ends: Codes
+    hands: Array
+
+    @property
+    def points(self) -> Array:
+        """Nearest points of the outline in O, (n, rows, k, 2) [m]."""
+        return self.seen[..., :2]
+
+    @property
+    def gaps(self) -> Array:
+        """(n, rows, k) [m]."""
+        return self.seen[..., 2]
+
+    @property
+    def modes(self) -> Codes:
+        """Codes of the last modes, and of all modes on the way as bits, (n, rows, k, 2)."""
+        return self.seen.view(np.int64)[..., 3:]
+
+
+class Runner:
+    """Makes the runs of one plant; arguments as Plant's."""
+
+    def __init__(
+        self,
+        outline: Outline,
+        surface: LimitSurface,
+        cof: Array,
+        friction: float,
+        radius: float,
+        tips: Array,
+        plain: bool,
+    ) -> None:
+        self._plain = Fingers(outline, surface, cof, friction, radius, tips)
+        known = not plain and len(tips) <= 2 and compilable(surface)
+        self._surface = surface_arrays(surface) if known else None
+        self._outline = o = outline_arrays(outline)
+        # What the kernel is given of the plant itself, made once: making it takes longer than a step.
+        row = (o.x, o.y, o.radius, o.size, radius, o.circle, o.convex)
+        self._things = np.array([row], OUTLINE), o.edges, records(POINT, tips)
+        self._own: RunArrays | None = None
+        if self._surface is not None:
+            self._own = run_arrays([self._surface], cof[None], np.array([friction]))
+        self._step: Callable[..., None] | None = None  # the kernel, with what it is given of the plant itself
+
+    def step(self, q: Array, way: Array) -> Done:
+        """One run from X_WO q (3,) under hands that go straight between two poses (2, h, 3), the first known.
+
+        As run, but where the kernel is there already it costs little more than the kernel itself.
+        """
+        if self._step is None:
+            done = self.run(Task(q[None], way[None], AS_IT_IS, begin=1))
+            if self._own is not None and type(self._surface) in _ready:
+                from .kernels import many
+
+                def step(hands: int, *numbers: Array) -> None:
+                    many(courses[hands - 1], *own, *numbers)
+
+                own = *self._own, *self._things
+                courses = [np.array([(0, 1, 1, h, 2, 1, AS_IT_IS, 1, False)], COURSE) for h in (1, 2)]
+                self._step = step
+            return done
+        count, out, seen = way.shape[1], np.empty((1, 1, 3)), np.empty((1, 1, len(self._plain.tips), _SEEN))
+        end, room = np.array([*q.tolist(), 0.0, 0.0]), np.empty(_SCRATCH)
+        self._step(count, end, way.ravel(), out.ravel(), seen.ravel(), room)
+        codes = end.view(np.int64)[3:]
+        if codes[0] >= MANY:
+            return self.run(Task(q[None], way[None], AS_IT_IS, begin=1))
+        return Done(out, seen, codes[None], room[_HANDS : _HANDS + 3 * count].reshape(count, 3))
+
+    def run(self, task: Task, threads: int | None = None) -> Done:
+        """The runs of a task.
+
+        Raises:
+            InputError: for surfaces of several kinds or sizes.
+        """
+        n, k = len(task.starts), len(self._plain.tips)
+        ends = np.tile([MANY, 0], (n, 1))
+        seen = np.zeros((n, task.rows, k, _SEEN))
+        done = Done(np.empty((n, task.rows, 3)), seen, ends, task.hands[-1, 0].copy())
+        surfaces = None if self._surface is None else [self._surface]
+        if surfaces and task.surfaces is not None:
+            known = all(map(compilable, task.surfaces))
+            surfaces = [surface_arrays(s) for s in task.surfaces] if known else None
+        if surfaces and n:
+            if type(surfaces[0]) not in _ready:
+                _patience[0] -= n * self._work(task.hands)
+            if type(surfaces[0]) in _ready or _patience[0] < 0:
+                self._compiled(task, surfaces, threads, done)
+            else:
+                self._interpreted(task, surfaces, done)
+        for r in np.flatnonzero(ends[:, 0] >= MANY).tolist():
+            self._plainly(task, r, done)
+        return done
+
+    def _work(self, hands: Array) -> float:
+        """Steps that a run takes at least."""
+        turn = np.max(np.hypot(*self._plain.tips.T)) + self._outline.size
+        ways = np.abs(np.diff(hands, axis=1)) @ [1.0, 1.0, turn] / (steps.STEP * self._outline.size)
+        return float(np.max(np.sum(np.maximum(1.0, ways), axis=(1, 2)), initial=1.0))
+
+    def _compiled(
+        self, task: Task, surfaces: Sequence[SurfaceArrays], threads: int | None, done: Done
+    ) -> None:
+        from .kernels import many
+
+        own = self._own
+        if task.surfaces is not None or task.frictions is not None or task.cofs is not None:
+            cofs = self._plain.cof[None] if task.cofs is None else task.cofs
+            mus = np.array([self._plain.friction]) if task.frictions is None else task.frictions
+            own = run_arrays(surfaces, cofs, mus)
+        if own is None:
+            raise InputError("the surfaces of many runs are of one kind and size")
+        n, (_, number, count, _) = len(task.starts), task.hands.shape
+        ends = np.concatenate([task.starts, np.zeros((n, 2))], axis=1)
+        way, out, seen, ran = task.hands.ravel(), done.poses.ravel(), done.seen.ravel(), ends.ravel()
+        workers = 1 if n == 1 else threads or os.cpu_count() or 1
+        size = max(1, -(-n // (4 * workers)))
+
+        def chunk(first: int) -> None:
+            last = min(first + size, n)
+            how = first, last, len(surfaces), count, number, task.begin, task.kind, task.rows, task.push_out
+            room = np.empty(_SCRATCH)
+            many(np.array([how], COURSE), *own, *self._things, ran, way, out, seen, room)
+            if first == 0:
+                done.hands[:] = room[_HANDS : _HANDS + 3 * count].reshape(count, 3)
+
+        chunk(0)  # compiles, if need be, in one thread
+        _ready.add(type(surfaces[0]))
+        if n > size:
+            with ThreadPoolExecutor(workers) as pool:
+                list(pool.map(chunk, range(size, n, size)))
+        done.ends[:] = ends.view(np.int64)[:, 3:]
+
+    def _interpreted(self, task: Task, surfaces: Sequence[SurfaceArrays], done: Done) -> None:
+        room, count = scratch(), task.hands.shape[2]
+        ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in task.hands]
+        plain = [interpreted(arrays) for arrays in surfaces]
+        outline, fingers = interpreted(self._outline), plain_rows(self._things[2])
+        out, seen = blank(POSE, task.rows), blank(SEEN, task.rows * len(fingers))
+        start = blank(POSE, 1)[0]
+        for r, pose in enumerate(task.starts.tolist()):
+            made, way = self._of_run(task, r), ways[r % len(ways)]
+            x, y = made.cof.tolist()
+            setting = Setting(plain[r % len(plain)], x, y, outline, made.friction, made.radius, fingers)
+            start.x, start.y, start.angle = pose
+            try:
+                if task.push_out:
+                    steps.push_out(setting, start, way[:count], room)
+                done.ends[r] = steps.follow(
+                    setting, start, way, count, task.begin, task.kind, out, seen, room
+                )
+            except (ArithmeticError, ValueError):  # where the compiled formulas go on with inf or nan
+                done.ends[r] = UNDECIDED, 0
+                continue
+            done.poses[r] = [(q.x, q.y, q.angle) for q in out]
+            done.seen[r, ..., :3] = np.reshape([(s.x, s.y, s.gap) for s in seen], (task.rows, -1, 3))
+            done.modes[r] = np.reshape([(s.mode, s.modes) for s in seen], (task.rows, -1, 2))
+            done.hands[:] = [(h.x, h.y, h.angle) for h in room.hands[:count]]
+
+    def _plainly(self, task: Task, r: int, done: Done) -> None:
+        fingers, q, way = self._of_run(task, r), task.starts[r].copy(), task.hands[r % len(task.hands)]
+        if task.push_out:
+            runs.push_out(fingers, q, way[0])
+        seen = done.seen[r].view(SEEN)[..., 0]
+        status, reached, done.hands[:] = runs.follow(
+            fingers, q, way, task.begin, task.kind, done.poses[r], seen
+        )
+        done.ends[r] = status, reached
+
+    def _of_run(self, task: Task, r: int) -> Fingers:
+        """The plain plant with what a run has of its own."""
+        own = self._plain
+        surface = own.surface if task.surfaces is None else task.surfaces[r % len(task.surfaces)]
+        cof = own.cof if task.cofs is None else task.cofs[r % len(task.cofs)]
+        mu = own.friction if task.frictions is None else float(task.frictions[r % len(task.frictions)])
+        return Fingers(own.outline, surface, cof, mu, own.radius, own.tips)
