@@ -130,7 +130,7 @@ def bitmap_scene(folder: Path, pixels: np.ndarray, **outline: Any) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", ["mask", "photograph", "transparent"])
+@pytest.mark.parametrize("kind", ["mask", "photograph", "transparent", "sixteen bits"])
 def test_a_bitmap_gives_the_smooth_shape(tmp_path: Path, kind: str) -> None:
     tilt = 0.4
     inside = ellipse(tilt)
@@ -141,6 +141,8 @@ def test_a_bitmap_gives_the_smooth_shape(tmp_path: Path, kind: str) -> None:
         pixels = (np.where(inside, 60, 200) + rng.normal(0, 4, inside.shape)).astype(np.uint8)
         pixels[20:23, 20:23] = 60
         pixels[145:155, 160:175] = 200
+    elif kind == "sixteen bits":  # both above 255, to which they were cut off
+        pixels = np.where(inside, 40_000, 500).astype(np.uint16)
     else:
         pixels = np.zeros((*inside.shape, 4), dtype=np.uint8)
         pixels[..., 3] = np.where(inside, 255, 0)
@@ -163,6 +165,8 @@ def test_a_bitmap_gives_the_smooth_shape(tmp_path: Path, kind: str) -> None:
         ("edge", "touches the edge"),
         ("empty", "shows no object"),
         ("uneven", "background of the bitmap is not plain"),
+        ("neck", "thinner than three pixels"),
+        ("point", "thinner than three pixels"),
     ],
 )
 def test_bad_bitmaps(tmp_path: Path, change: str, words: str) -> None:
@@ -174,11 +178,33 @@ def test_bad_bitmaps(tmp_path: Path, change: str, words: str) -> None:
         pixels[:160, 160] = 255
     elif change == "empty":
         pixels[:] = 0
+    elif change == "neck":  # two squares that touch at a corner: the larger one became the object
+        pixels[:] = 0
+        pixels[20:100, 20:120] = pixels[100:200, 120:220] = 255
+    elif change == "point":  # was a traceback
+        pixels[:] = 0
+        pixels[100, 100] = 255
     else:
         pixels[:, :] = np.linspace(0, 255, pixels.shape[1]).astype(np.uint8)
     with pytest.raises(InputError, match=words) as caught:
         load_scene(bitmap_scene(tmp_path, pixels))
     assert "mask.png" in str(caught.value)
+
+
+def test_a_photograph_is_read_as_it_is_seen(tmp_path: Path) -> None:
+    """A camera stores how it was held; the outline was turned by 90° against the picture on the screen."""
+    from PIL import Image
+
+    path = bitmap_scene(tmp_path, np.where(ellipse(0.0), 255, 0).astype(np.uint8), origin="centroid")
+    lying = load_scene(path).object.outline
+    with Image.open(tmp_path / "mask.png") as image:
+        held = Image.Exif()
+        held[0x0112] = 6  # turn it by 90° to see it upright
+        image.save(tmp_path / "mask.png", exif=held)
+    standing = load_scene(path).object.outline
+    np.testing.assert_allclose(
+        np.ptp(standing.vertices, axis=0), np.ptp(lying.vertices, axis=0)[::-1], atol=1e-4
+    )
 
 
 def test_what_is_no_bitmap_and_a_missing_pixel_are_refused(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import os
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.pose import Array, cross
@@ -54,14 +55,22 @@ def read_bitmap(path: str | os.PathLike[str]) -> tuple[Array, str, list[LeftOut]
         left.append(LeftOut(f"{count - 1} specks", "smaller than 1 % of the object"))
     if int(whole.sum()) > int(sizes.max()):
         left.append(LeftOut("what is inside the outline", "inside the outline (a hole)"))
-    points = smooth_outline(whole) * (1.0, -1.0)
+    smooth = smooth_outline(whole)
+    if smooth is None:
+        raise InputError(
+            "the object has parts thinner than three pixels, or is no larger",
+            source=source,
+            hint="Give a finer bitmap.",
+        )
+    points = smooth * (1.0, -1.0)
     return points, f"the object of {int(sizes.max())} pixels", left, TOLERANCE
 
 
-def smooth_outline(mask: np.ndarray) -> Array:
+def smooth_outline(mask: NDArray[np.bool_]) -> Array | None:
     """The outline of the only region of a mask without its steps, shape (n, 2): x to the right, y down [pixels].
 
-    A pixel of column c and row r covers c to c + 1 and r to r + 1.
+    A pixel of column c and row r covers c to c + 1 and r to r + 1. None where smoothing would part the region or take
+    it away: what is thinner than about three pixels.
     """
     from contourpy import LineType, contour_generator
     from scipy import ndimage
@@ -70,8 +79,12 @@ def smooth_outline(mask: np.ndarray) -> Array:
     pad = 4
     blurred = ndimage.gaussian_filter(np.pad(mask, pad).astype(float), _BLUR)
     lines = contour_generator(z=blurred, line_type=LineType.Separate).lines(0.5)
-    largest = max(lines, key=lambda line: Polygon(line).area)
-    return np.array(Polygon(largest + (0.5 - pad)).simplify(_SIMPLE).exterior.coords)[:-1]
+    shapes = sorted(
+        (Polygon(line + (0.5 - pad)) for line in lines if len(line) > 3), key=lambda shape: shape.area
+    )
+    if not shapes or sum(shape.area for shape in shapes[:-1]) > _SPECK * shapes[-1].area:
+        return None
+    return np.array(shapes[-1].simplify(_SIMPLE).exterior.coords)[:-1]
 
 
 def without_steps(corners: Array) -> tuple[Array, float] | None:
@@ -103,8 +116,8 @@ def without_steps(corners: Array) -> tuple[Array, float] | None:
     for (x, y0), (x1, y1) in zip(cells, np.roll(cells, -1, axis=0), strict=True):
         if x == x1:
             flips[min(y0, y1) : max(y0, y1), x] += 1
-    mask = np.cumsum(flips, axis=1)[:, :-1] % 2 == 1
-    return low + step * smooth_outline(mask), TOLERANCE * step
+    smooth = smooth_outline(np.cumsum(flips, axis=1)[:, :-1] % 2 == 1)
+    return None if smooth is None else (low + step * smooth, TOLERANCE * step)
 
 
 _HINT = "Give a mask, or a photograph of the whole object alone on a plain background."
@@ -114,7 +127,7 @@ def _contrast(path: str | os.PathLike[str], source: str) -> Array:
     """How far each pixel is from the background, (rows, columns)."""
     import io
 
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     content = read_bytes(path, 100_000_000)
     try:
@@ -123,7 +136,10 @@ def _contrast(path: str | os.PathLike[str], source: str) -> Array:
                 raise InputError(
                     "a bitmap has at most 40 million pixels", source=source, hint="Make it smaller."
                 )
-            colours = np.asarray(image.convert("RGBA"), dtype=float)
+            upright = ImageOps.exif_transpose(image)
+            if upright.mode[0] in "IF":  # more than 8 bits, which a conversion would cut off
+                return _away(np.asarray(upright, dtype=float)[..., None], source)
+            colours = np.asarray(upright.convert("RGBA"), dtype=float)
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError) as error:
         if isinstance(error, InputError):
             raise
@@ -132,12 +148,16 @@ def _contrast(path: str | os.PathLike[str], source: str) -> Array:
         ) from error
     if np.ptp(colours[..., 3]) > 0:
         return colours[..., 3]
-    rgb = colours[..., :3]
+    return _away(colours[..., :3], source)
+
+
+def _away(rgb: Array, source: str) -> Array:
+    """How far each pixel (rows, columns, channels) is from the colour of the border; that must be plain."""
     rim = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
     background = np.median(rim, axis=0)
     contrast = np.abs(rgb - background).max(axis=-1)
     spread = float(np.percentile(np.abs(rim - background).max(axis=-1), 95))
-    if spread > _PLAIN * max(float(np.percentile(contrast, 99)), 1.0):
+    if not np.all(np.isfinite(rgb)) or spread > _PLAIN * float(np.percentile(contrast, 99)):
         raise InputError("the background of the bitmap is not plain", source=source, hint=_HINT)
     return contrast
 
