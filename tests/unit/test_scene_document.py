@@ -389,7 +389,7 @@ def test_the_examples_are_there() -> None:
         "rectangle_boundary",
         "butterfly",
     }
-    assert names >= {"disc", "l_shape", "t_shape"}
+    assert names >= {"disc", "l_shape", "t_shape", "bracket", "workshop"}
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
