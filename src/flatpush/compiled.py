@@ -140,24 +140,42 @@ class _Kept(caching.NullCache):
         compiling.begin("", 0, quiet=True)
         try:
             name = self._name(sig, target_context.codegen())
-            data = kernel_store.load(name)
-            if data is None:
-                return None
-            try:
-                return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
-            except Exception:  # another version wrote it: whatever it is that fails, it is compiled again
-                kernel_store.discard(name)
-                return None
+            found = self._load(name, target_context)
+            if found is not None:
+                return found
+            free = kernel_store.claim(name)
         finally:
             compiling.end()
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        if not data._asdict()["library"].has_dynamic_globals:
-            compiling.begin("", 0, quiet=True)
+        if not free:
+            _begin(self._compiled)
             try:
-                kernel_store.save(self._name(sig, data.codegen), serialize.dumps(data._reduce()))
+                kernel_store.claim(name, kernel_store.WAIT)
             finally:
                 compiling.end()
+        found = self._load(name, target_context)  # another process may have made it just now
+        if found is not None:
+            kernel_store.release(name)
+        return found
+
+    def _load(self, name: str, target_context: Any) -> Any:
+        data = kernel_store.load(name)
+        if data is None:
+            return None
+        try:
+            return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+        except Exception:  # another version wrote it: whatever it is that fails, it is compiled again
+            kernel_store.discard(name)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        compiling.begin("", 0, quiet=True)
+        try:
+            name = self._name(sig, data.codegen)
+            if not data._asdict()["library"].has_dynamic_globals:
+                kernel_store.save(name, serialize.dumps(data._reduce()))
+            kernel_store.release(name)
+        finally:
+            compiling.end()
 
     def _name(self, sig: Any, codegen: Any) -> str:
         """Name of the file for a signature, readable at its beginning."""

@@ -1,7 +1,8 @@
 """Where compiled kernels are kept between runs: a file each, which is whole and unharmed or does not count.
 
 The folder is `flatpush-kernels` in `NUMBA_CACHE_DIR` if that is set, else in the user's folder for caches
-(`XDG_CACHE_HOME`, by default ~/.cache). A file begins with a digest of the rest.
+(`XDG_CACHE_HOME`, by default ~/.cache). A file begins with a digest of the rest. What one process compiles, others that
+want the same wait for and read: see `claim`.
 """
 
 import hashlib
@@ -12,11 +13,20 @@ import warnings
 from contextlib import suppress
 from pathlib import Path
 
+try:
+    import fcntl
+except ImportError:  # Windows: two processes then may compile the same
+    fcntl = None  # type: ignore[assignment]
+
 DIGEST_BYTES = 16
 DAY = 86400.0  # [s]
 KEPT = 60 * DAY  # unused for so long, a file is removed
 
+WAIT = 300.0  # for another process that compiles the same [s]; the longest kernel takes a tenth of it
+GLANCE = 0.02  # between two looks whether it is ready [s]
+
 _told = False
+_claims: dict[str, int] = {}  # name → handle of the locked file
 
 
 def folder() -> Path | None:
@@ -65,6 +75,49 @@ def save(name: str, data: bytes) -> None:
         _tidy(place)
     except OSError as error:
         _tell_once(place, error)
+
+
+def claim(name: str, patience: float = 0.0) -> bool:
+    """Asks to be the one process that makes what is kept under a name; the claim ends with `release` or the process.
+
+    Args:
+        patience: how long to wait while another process has it [s].
+
+    Returns:
+        False if another process still has it. Where files cannot be locked everyone may.
+    """
+    place = folder()
+    if fcntl is None or place is None or name in _claims:
+        return True
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        handle = os.open(place / f"{name}.lock", os.O_CREAT | os.O_RDWR)
+    except OSError:
+        return True
+    until = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() < until:
+                time.sleep(GLANCE)
+                continue
+            os.close(handle)
+            return False
+        except OSError:  # a file system without locks
+            os.close(handle)
+            return True
+        _claims[name] = handle
+        return True
+
+
+def release(name: str) -> None:
+    """Ends a claim, if there is one."""
+    handle = _claims.pop(name, None)
+    if handle is not None:
+        discard(f"{name}.lock")
+        fcntl.flock(handle, fcntl.LOCK_UN)
+        os.close(handle)
 
 
 def discard(name: str) -> None:

@@ -86,6 +86,47 @@ def test_what_nobody_used_for_long_goes(own_store):
     assert sorted(path.name for path in own_store.iterdir()) == ["new"]
 
 
+def test_what_one_process_compiles_another_waits_for_and_reads(own_store):
+    """Two at once: one compiles, the other finds it ready."""
+    (own_store.parent / "sixfold.py").write_text(
+        "import sys\nfrom flatpush.compiled import kernel\n\n@kernel()\ndef made(x):\n    return 6.0 * x\n\n"
+        "sys.stdin.readline()\n"
+        "print(made(2.0), sum(made.stats.cache_hits.values()), sum(made.stats.cache_misses.values()))\n"
+    )
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", "import sixfold"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=own_store.parent,
+        )
+        for _ in range(2)
+    ]
+    for process in both:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    told = sorted(process.communicate(timeout=120)[0].split() for process in both)
+    assert told == [["12.0", "0", "1"], ["12.0", "1", "0"]]
+    assert [name for name in os.listdir(own_store) if name.endswith(".lock")] == []
+
+
+def test_a_claim_is_had_by_one_process_and_ends_with_it(own_store):
+    code = "import sys, flatpush.kernel_store as k; print(k.claim('name'), flush=True); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout.readline() == "True\n"
+        assert not kernel_store.claim("name", 0.1)
+        other.kill()
+        other.wait(timeout=60)
+    assert kernel_store.claim("name", 60.0)
+    assert kernel_store.claim("name")  # its own
+    kernel_store.release("name")
+    kernel_store.release("name")
+    assert os.listdir(own_store) == []
+
+
 CALLEE = "def helper(x):\n    return x * FACTOR\n"
 CALLER = "def outer(x):\n    return helper(x) + 1.0\n"
 

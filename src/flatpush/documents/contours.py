@@ -205,6 +205,7 @@ def _nodes(points: Array, tolerance: float) -> list[tuple[int, int]]:
     from scipy.spatial import cKDTree
 
     near = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    near = near.astype(np.int32)  # scipy 1.11 walks through no others
     links = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
     labels = connected_components(links, directed=False)[1].reshape(-1, 2)
     return [(int(u), int(v)) for u, v in labels]
