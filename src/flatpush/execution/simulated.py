@@ -98,6 +98,24 @@ class Unknown:
     friction: float | None = None
     seed: int = 0
 
+    @classmethod
+    def of(cls, address: Address) -> Self:
+        """The options start=MM,MM,DEG, noise=MM,DEG, tool=MM, friction=μ and seed=N of an address."""
+        shift, spread = address.numbers("start", 3, (0, 0, 0)), address.numbers("noise", 2, (0, 0))
+        (tool,), (friction,) = address.numbers("tool", 1, (0,)), address.numbers("friction", 1, (np.nan,))
+        return cls(
+            (shift[0] / 1000, shift[1] / 1000, float(np.deg2rad(shift[2]))),
+            (spread[0] / 1000, float(np.deg2rad(spread[1]))),
+            tool / 1000,
+            None if np.isnan(friction) else friction,
+            round(address.numbers("seed", 1, (0,))[0]),
+        )
+
+    def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """By how much the object's start (3,) and the fingertips (2,) are off."""
+        spread = np.array([self.noise[0], self.noise[0], self.noise[1]])
+        return rng.standard_normal(3) * spread + self.start, rng.standard_normal(2) * self.tool
+
 
 class SimRobot(DryRun):
     """The same with an object on the table, in the contact simulator.
@@ -115,10 +133,8 @@ class SimRobot(DryRun):
     ) -> None:
         super().__init__(home_of(plan) if home is None else home, limits)
         unknown = unknown or Unknown()
-        rng = np.random.default_rng(unknown.seed)
-        spread = np.array([unknown.noise[0], unknown.noise[0], unknown.noise[1]])
-        off = rng.standard_normal(3) * spread + unknown.start
-        self._beside = np.append(rng.standard_normal(2) * unknown.tool, 0.0)
+        off, tool = unknown.draw(np.random.default_rng(unknown.seed))
+        self._beside = np.append(tool, 0.0)
         scene = plan.scene
         self._plant = Plant(
             scene.object, plan.pushes[0].fingers, scene.pusher.tip_radius, friction=unknown.friction
@@ -159,14 +175,6 @@ def dry_run(address: Address, plan: Plan) -> DryRun:
 
 def sim(address: Address, plan: Plan) -> SimRobot:
     """`sim?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&seed=N`"""
-    limits = address.limits(Limits())
-    shift, spread = address.numbers("start", 3, (0, 0, 0)), address.numbers("noise", 2, (0, 0))
-    unknown = Unknown(
-        (shift[0] / 1000, shift[1] / 1000, float(np.deg2rad(shift[2]))),
-        (spread[0] / 1000, float(np.deg2rad(spread[1]))),
-        address.numbers("tool", 1, (0,))[0] / 1000,
-        address.numbers("friction", 1, (plan.scene.object.friction,))[0],
-        round(address.numbers("seed", 1, (0,))[0]),
-    )
+    limits, unknown = address.limits(Limits()), Unknown.of(address)
     address.check_used()
     return SimRobot(plan, unknown, limits=limits)

@@ -1,0 +1,1 @@
+"""A physics cell (MuJoCo): table, tool and object."""

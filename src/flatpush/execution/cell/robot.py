@@ -1,0 +1,130 @@
+"""A tool in the physics cell: its drives follow the targets, its fingers push the object, MuJoCo decides the rest."""
+
+import os
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import InputError, MissingExtra
+from ...geometry.pose import Array
+from ...problem import Plan
+from ..addresses import Address
+from ..robot import Limits, RobotFault, State
+from ..simulated import DryRun, Unknown, home_of
+from .model import DAMPING, STEP, STIFFNESS, Physics, cell_xml, height_of
+
+LIMITS = Limits(period=0.004, deviation=0.005)
+# The joints at the beginning are the object's, those at the end the tool's.
+OBJECT, TOOL = slice(0, 3), slice(-4, None)
+# The drives are led by this much of the speed, so that their damping does not hold the tool back [s].
+LEAD = DAMPING / STIFFNESS
+PICTURE = (960, 1280)
+
+
+def load() -> ModuleType:
+    """MuJoCo, drawing without a display where there is none.
+
+    Raises:
+        MissingExtra: if it is not installed.
+    """
+    if "DISPLAY" not in os.environ:
+        os.environ.setdefault("MUJOCO_GL", "egl")
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingExtra('the physics cell needs MuJoCo: pip install "flatpush[sim]"') from None
+    return mujoco
+
+
+class CellRobot(DryRun):
+    """A position-controlled tool and the object of a plan in MuJoCo.
+
+    Args:
+        plan: whose object and fingers it has. unknown: in what they differ. table: friction of the feet.
+        home: of the tool. limits: what may be asked for.
+
+    Raises:
+        MissingExtra: without MuJoCo.
+        InputError: for fingers that would not pass over the object when they are lifted.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        unknown: Unknown | None = None,
+        *,
+        table: float | None = None,
+        home: ArrayLike | None = None,
+        limits: Limits = LIMITS,
+    ) -> None:
+        super().__init__(home_of(plan) if home is None else home, limits)
+        self._mujoco = load()
+        unknown, scene = unknown or Unknown(), plan.scene
+        if height_of(scene) / 2 + scene.pusher.lift - scene.pusher.tip_radius < height_of(scene):
+            raise InputError(
+                "the fingertips do not pass over the object", key="pusher.lift", value=scene.pusher.lift
+            )
+        rng = np.random.default_rng(unknown.seed)
+        start, tool = unknown.draw(rng)
+        friction = scene.object.friction if unknown.friction is None else unknown.friction
+        physics = Physics(friction, tool=(float(tool[0]), float(tool[1])))
+        if table is not None:
+            physics = Physics(friction, table, physics.tool)
+        self._model = self._mujoco.MjModel.from_xml_string(cell_xml(scene, plan.pushes[0].fingers, physics))
+        self._data = self._mujoco.MjData(self._model)
+        self._data.qpos[OBJECT], self._data.qpos[TOOL] = scene.start_pose + start, self._pose
+        self._data.ctrl[:] = self._pose
+        self._held = self._pose
+        self._mujoco.mj_forward(self._model, self._data)
+
+    @property
+    def object(self) -> Array:
+        """X_WO, shape (3,)."""
+        return np.array(self._data.qpos[OBJECT])
+
+    def state(self) -> State:
+        self._check()
+        return State(np.array(self._data.qpos[TOOL]), np.array(self._data.qvel[TOOL]), self.clock.now())
+
+    def stop(self) -> None:
+        self._target = None
+
+    def picture(self, path: str | os.PathLike[str]) -> None:
+        """Draws the cell as it is now, as a .png."""
+        from PIL import Image
+
+        camera = self._mujoco.MjvCamera()
+        camera.lookat[:2] = 0.5 * (self.object[:2] + self._data.qpos[TOOL][:2])
+        camera.distance, camera.azimuth, camera.elevation = 0.35, 60.0, -40.0
+        with self._mujoco.Renderer(self._model, *PICTURE) as renderer:
+            renderer.update_scene(self._data, camera)
+            Image.fromarray(renderer.render()).save(Path(path))
+
+    def _advance(self, until: float) -> None:
+        steps = round((until - self.clock.now()) / STEP)
+        begin, target, before = self.clock.now(), self._target, self._held
+        for k in range(1, steps + 1):
+            if target is not None and target.time > begin:
+                share = min(1.0, k * STEP / (target.time - begin))
+                self._held = before + share * (target.pose - before)
+                moving = begin + k * STEP < target.time + 0.5 * STEP
+                self._data.ctrl[:] = self._held + (LEAD * target.twist if moving else 0.0)
+            else:
+                self._data.ctrl[:] = self._held
+            self._mujoco.mj_step(self._model, self._data)
+        if self._data.warning.number.any():
+            raise RobotFault("the physics of the cell is unstable")
+
+
+def mujoco(address: Address, plan: Plan) -> CellRobot:
+    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`"""
+    if address.host not in ("", "tool"):
+        raise InputError(
+            "the physics cell has no such arm", value=address.text, hint="There is mujoco://tool."
+        )
+    limits, unknown = address.limits(LIMITS), Unknown.of(address)
+    (table,) = address.numbers("table", 1, (np.nan,))
+    address.check_used()
+    return CellRobot(plan, unknown, table=None if np.isnan(table) else table, limits=limits)

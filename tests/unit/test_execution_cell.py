@@ -1,0 +1,97 @@
+"""The physics cell: its feet carry the support's pressure, and plans end in it where they should."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+import shapely
+
+import flatpush as fp
+from flatpush.execution import DONE, open_robot, run
+from flatpush.execution.cell.model import HEIGHT, MASS, Physics, cell_xml, convex_pieces
+from flatpush.execution.cell.robot import CellRobot, load
+from flatpush.execution.simulated import Unknown
+from flatpush.geometry import pose_error
+from flatpush.testing import check_robot
+
+
+@pytest.fixture(scope="module")
+def short_plan(three_feet):
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    return fp.plan(fp.Scene(three_feet, (-0.02, -0.04, 0.2), pusher=pusher, pushes=pushes))
+
+
+def test_every_foot_carries_its_share(short_plan):
+    mujoco = load()
+    thing, tips = short_plan.scene.object, short_plan.pushes[0].fingers
+    model = mujoco.MjModel.from_xml_string(cell_xml(short_plan.scene, tips, Physics(0.3)))
+    data = mujoco.MjData(model)
+    data.qpos[-2] = data.ctrl[-2] = 0.03  # the fingers are up
+    mujoco.mj_step(model, data, 500)
+    force, found = np.zeros(6), {}
+    for k in range(data.ncon):
+        mujoco.mj_contactForce(model, data, k, force)
+        pair = data.contact[k]
+        foot = max(pair.geom1, pair.geom2)
+        found[tuple(np.round(data.geom_xpos[foot][:2], 6))] = force[0]
+    places, weights = thing.support.feet
+    assert len(found) == len(places)
+    for place, weight in zip(places, weights, strict=True):
+        assert found[tuple(np.round(place, 6))] == pytest.approx(0.98 * MASS * 9.81 * weight, rel=1e-3)
+    assert model.geom("floor").pos[2] == pytest.approx(-HEIGHT / 2 - 0.001)
+
+
+def test_outlines_become_convex_pieces():
+    corner = np.array([(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.04), (0, 0.04)])
+    pieces = [shapely.Polygon(piece) for piece in convex_pieces(corner)]
+    assert len(pieces) == 2
+    assert all(piece.convex_hull.area == pytest.approx(piece.area) for piece in pieces)
+    assert shapely.unary_union(pieces).symmetric_difference(shapely.Polygon(corner)).area < 1e-12
+    assert len(convex_pieces(corner[:3])) == 1
+
+
+def test_a_plan_ends_at_its_goal_with_the_tool_where_it_was_sent(short_plan):
+    with open_robot("mujoco://tool", short_plan) as robot:
+        ended = run(short_plan, robot)
+    assert ended.outcome == DONE
+    error = pose_error(ended.object, short_plan.scene.goal)
+    assert np.hypot(*error[:2]) < 0.0005
+    assert abs(error[2]) < math.radians(0.3)
+    off = [cycle.off for cycle in ended.cycles if "push" in cycle.leg]
+    assert np.mean(off) < 0.0001
+    assert np.max(off) < 0.0003
+
+
+def test_what_the_plan_does_not_know_is_in_the_cell(short_plan):
+    robot = CellRobot(short_plan, Unknown(start=(0.001, -0.002, 0.03)))
+    assert np.allclose(robot.object, short_plan.scene.start_pose + np.array([0.001, -0.002, 0.03]))
+    one, two, same = (CellRobot(short_plan, Unknown(noise=(0.001, 0.01), seed=s)).object for s in (1, 2, 1))
+    assert np.array_equal(one, same)
+    assert not np.allclose(one, two)
+    for address, rule in (("mujoco://ur99", "no such arm"), ("mujoco://tool?colour=1", "no option 'colour'")):
+        with pytest.raises(fp.InputError, match=rule):
+            open_robot(address, short_plan)
+
+
+def test_pictures_need_no_display(short_plan, tmp_path):
+    from PIL import Image
+
+    pytest.importorskip("mujoco")
+    path = tmp_path / "cell.png"
+    with CellRobot(short_plan) as robot:
+        robot.picture(path)
+    drawn = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    blue = (drawn[..., 2] > drawn[..., 0] + 60).mean()
+    assert 0.002 < blue < 0.2
+
+
+def test_without_mujoco_one_line_says_so(short_plan, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(fp.MissingExtra, match=r'pip install "flatpush\[sim\]"'):
+        open_robot("mujoco://tool", short_plan)
+
+
+def test_the_cell_conforms(short_plan):
+    assert len(check_robot(lambda: open_robot("mujoco://tool", short_plan))) == 10
