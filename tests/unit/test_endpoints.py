@@ -62,11 +62,6 @@ def test_a_cross_is_an_overlap_although_no_corner_is_inside():
         answer(obstacles=(BLOCK, bar))
 
 
-def test_robust_plans_are_refused_rather_than_forgotten():
-    with pytest.raises(fp.InputError, match="robust plans are made on an empty table only"):
-        answer(robust=True)
-
-
 def test_touching_is_allowed():
     assert np.isfinite(answer(goal=(-0.03, 0.0, 0.0), obstacles=()).cost)
     answer(start=(0.0, 0.0, 0.0), obstacles=[[(0.01, -0.05), (0.02, -0.05), (0.02, 0.05), (0.01, 0.05)]])

@@ -10,13 +10,15 @@ import pytest
 import flatpush as fp
 from flatpush.geometry import Outline
 from flatpush.geometry.collision import Body, World, path_clearance, pose_clearance
-from flatpush.planning.obstacles import Search
+from flatpush.planning.empty_table import direct_paths
+from flatpush.planning.obstacles import Search, query_of
 from flatpush.planning.obstacles.lattice import Lattice, Level, Reach
 from flatpush.planning.obstacles.polish import Chain
 from flatpush.planning.obstacles.trees import Trees
 from flatpush.planning.path import Path, pieces_of
+from flatpush.planning.query import Query
 
-from ..maze import MAZE_A, MAZE_B, check_way, dense_clearance, maze_query, maze_scene, stored_query
+from ..maze import EXAMPLE, MAZE_A, MAZE_B, check_way, dense_clearance, maze_query, maze_scene, stored_query
 
 NEED = 1.5e-5
 
@@ -219,6 +221,76 @@ def test_where_nothing_is_in_the_way_the_plan_is_that_without_obstacles():
     far = np.array([(0.5, 0.5), (0.6, 0.5), (0.6, 0.6)])
     kept = fp.Planner(replace(scene, workspace=fp.Workspace(None, (far,)))).plan()
     assert kept.cost <= fp.Planner(free).plan().cost * (1 + 1e-3)
+
+
+def crossing(robust=False) -> Query:
+    """A triangle that is turned beside a block by two pushes, whose cheapest switch pose sits on a jump."""
+    scene = fp.load_scene(EXAMPLE.with_name("triangle.yaml"))
+    block = np.array([(-0.06, -0.09), (-0.03, -0.09), (-0.03, -0.06), (-0.06, -0.06)])
+    planner = fp.Planner(
+        replace(
+            scene,
+            start=(0.06, 0.02, 2.6),
+            workspace=fp.Workspace((-0.3, -0.3, 0.3, 0.3), (block,)),
+            planning=replace(scene.planning, switch_cost=0.01, robust=robust),
+        )
+    )
+    return query_of(planner.scene, planner.usable, planner.fleet)
+
+
+def replanned_plainly(query, path):
+    """Mean over the sixteen displacements of each switch pose of the cheapest of the plain words that keep clear."""
+    total = path.cost
+    for i in range(1, len(path.pieces)):
+        push = path.pieces[i][0]
+        if push == path.pieces[i - 1][0]:
+            continue
+        leg = [piece for piece in path.pieces[i : i + 3] if piece[0] == push]
+        total -= Path(path.fleet, path.poses[i], tuple(leg)).cost
+        for at in np.arange(8) * np.pi / 4:
+            for turn in np.deg2rad([0.2, -0.2]):
+                off = path.poses[i] + [2e-4 * np.cos(at), 2e-4 * np.sin(at), turn]
+                again = [path.cost]
+                for word in direct_paths(path.fleet, off, path.poses[i + len(leg)]):
+                    steps = [word.step(*piece) for piece in word.pieces]
+                    gap = path_clearance(query.world, query.bodies[push], off, steps).distance
+                    if word.pushes == (push,) and gap >= query.clearance:
+                        again.append(word.cost)
+                total += min(again) / 16
+    return total
+
+
+def test_robust_paths_cost_little_more_and_replan_cheaply():
+    nominal, robust = searched(crossing(), 0, 20_000), searched(crossing(robust=True), 0, 20_000)
+    assert nominal.cost == nominal.best.cost
+    judge = robust.value(nominal.best)
+    assert judge == pytest.approx(replanned_plainly(robust.query, nominal.best), rel=1e-9)
+    assert judge > 1.5 * nominal.cost
+    assert robust.cost == pytest.approx(replanned_plainly(robust.query, robust.best), rel=1e-9)
+    assert robust.cost < 1.01 * nominal.cost
+    check_way(robust.query, robust.best)
+
+
+def test_an_attempt_at_a_switch_pose_that_touches_is_lost():
+    """A block that leaves no room for the sixteen displacements of the switch pose: half of them or more are lost."""
+    query = crossing(robust=True)
+    path = searched(query, 0, 20_000).best
+    body, pose = (
+        query.bodies[path.pushes[1]],
+        path.poses[next(i for i in range(len(path.pieces)) if path.pieces[i][0] != path.pushes[0])],
+    )
+    room = pose_clearance(query.world, body, pose)
+    tight = replace(query, clearance=room - 1e-9)
+    assert Search(tight, 0).value(path) == pytest.approx(replanned_plainly(tight, path), rel=1e-9)
+    assert Search(tight, 0).value(path) > path.cost + 0.25 * path.cost
+
+
+def test_robust_is_planned_among_obstacles():
+    plan = fp.Planner(maze_scene(robust=True)).plan()
+    assert plan.status == "solved"
+    assert fp.verify(plan).ok
+    assert plan.run["replanning_cost"] >= plan.cost * (1 - 1e-6)
+    assert plan.certificate.clearance >= 0
 
 
 def test_offered_ways_must_be_free(query):

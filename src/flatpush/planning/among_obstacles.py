@@ -89,8 +89,8 @@ class AmongObstacles:
             self.stopped_by = "time_limit" if spent > planning.time_limit else "iterations" if done else ""
             done = bool(self.stopped_by)
             worth = min(given, self.best) * (1.0 if done else 1 - BETTER)
-            if path is not None and path.cost < worth:
-                given = path.cost
+            if path is not None and search.cost < worth:
+                given = search.cost
                 yield path
             if done:
                 return
@@ -115,7 +115,7 @@ class AmongObstacles:
         scene, need = self.scene, self.scene.planning.clearance
         shorter = pruned(self.query, path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
-        path = shorter if shorter.cost < self.best else path
+        path = shorter if self.search.value(shorter) < self.best else path
         try:
             segments = assemble(scene, self.transits, self.options, path)
         except FlatpushError as error:
@@ -129,11 +129,13 @@ class AmongObstacles:
                 f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm). "
             )
             return None
-        self.best = path.cost
+        self.best = self.search.value(path)
         if self._first is None:
             self._first = clock() - began
         details = {"first_path_time": self._first, "poses_searched": self.search.nodes}
-        return Found(path, path.cost, details), segments
+        if scene.planning.robust:
+            details["replanning_cost"] = self.best
+        return Found(path, self.best, details), segments
 
     @property
     def tried(self) -> str:

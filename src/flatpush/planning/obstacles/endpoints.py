@@ -17,16 +17,8 @@ def check_endpoints(scene: Scene) -> None:
     """Refuses a start or goal where the object is outside, in an obstacle, or nearer to either than is allowed.
 
     Raises:
-        InputError: names the end, the side or the obstacle (numbered as listed, from 0), and by how much; or a kind of
-            plan that is not made among obstacles.
+        InputError: names the end, the side or the obstacle (numbered as listed, from 0), and by how much.
     """
-    if scene.planning.robust:
-        raise InputError(
-            "robust plans are made on an empty table only, and this scene has bounds or obstacles",
-            key="planning: robust",
-            value=True,
-            hint="Leave robust out, or leave out the workspace; a clearance in planning: margin keeps errors harmless.",
-        )
     body, every = Body.of(scene.object.outline), World.of(None, scene.workspace.obstacles)
     for key, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
         _check_bounds(scene, key, pose)

@@ -9,7 +9,7 @@ from ...compiled import inner, kernel, shared
 from ...geometry.collision.body import BodyArrays
 from ...geometry.collision.kernels import BODY, WORLD, arc_gap, line_gap, still_gap
 from ...geometry.pose import Array
-from ...steering.six_words import CAR, LEFT, STRAIGHT, WORD, Records, all_words, drive
+from ...steering.six_words import CAR, LEFT, MOST_WORDS, STRAIGHT, WORD, Records, all_words, drive
 from ..path import NOTHING
 from ..query_arrays import HULL, QueryArrays
 
@@ -18,7 +18,7 @@ QUERY = QueryArrays(
     WORLD, _POINTS, _HULLS, _POINTS, _HULLS, np.zeros((1, 2)), np.zeros(1, CAR), np.zeros((1, 1)),
     np.zeros(1, np.bool_), _NO_OFFSETS, 0.0, 0.0, False,
 )  # fmt: skip
-_POSE, _WORD = np.zeros(3), np.zeros(1, WORD)[0]
+_POSE, _WORDS = np.zeros(3), np.zeros(1, WORD)
 
 
 @inner
@@ -110,7 +110,7 @@ def changes(T: QueryArrays, a: int, b: int, pose: Array) -> bool:
     return lands(T, a, pose) and lands(T, b, pose)
 
 
-@shared(False, QUERY, 0, _POSE, _WORD, _POSE)
+@shared(False, QUERY, 0, _POSE, _WORDS[0], _POSE)
 def keeps(T: QueryArrays, a: int, start: Array, word: Any, here: Array) -> bool:
     """Whether a word of push a keeps the clearance, from a start that is free. `here` ends at its end."""
     # The middles of its pieces refuse most of what is not free.
@@ -132,7 +132,7 @@ def keeps(T: QueryArrays, a: int, start: Array, word: Any, here: Array) -> bool:
     return True
 
 
-@inner
+@shared(0, QUERY, 0, _POSE, _POSE, 0.0, 0, _WORDS, _POSE)
 def connect(
     T: QueryArrays, a: int, start: Array, goal: Array, limit: float, tries: int, found: Records, here: Array
 ) -> int:
@@ -147,6 +147,33 @@ def connect(
         if keeps(T, a, start, found[k], here):
             return k
     return -1
+
+
+@inner
+def replanned(
+    T: QueryArrays, a: int, start: Array, goal: Array, lost: float, words: Records, off: Array, here: Array
+) -> float:
+    """What push a costs from a switch pose to a goal in the mean when the pose is missed by each of the offsets.
+
+    Where the push cannot land there or none of its words keeps clear, the attempt is lost, which costs `lost`.
+    """
+    cost = 0.0
+    for i in range(len(T.offsets)):
+        for j in range(3):
+            off[j] = start[j] + T.offsets[i, j]
+        best = lost
+        if free(T, a, off) and lands(T, a, off):
+            k = connect(T, a, off, goal, lost, MOST_WORDS, words, here)
+            if k >= 0:
+                best = words[k].cost
+        cost += best / len(T.offsets)
+    return cost
+
+
+@kernel()
+def cost_replanned(T: QueryArrays, a: int, start: Array, goal: Array, lost: float) -> float:
+    """As replanned."""
+    return replanned(T, a, start, goal, lost, np.empty(MOST_WORDS, WORD), np.empty(3), np.empty(3))
 
 
 @kernel()

@@ -18,6 +18,7 @@ EXPANSIONS, MOVES = (
     800,
     1200,
 )  # of a round: poses, divided by the number of pushes, and tries at a better path
+REPLANNED = 8  # moves that one counts as which is judged by replanning
 CHAINS = 5  # that are kept
 MOST = 1 << 20  # poses of a lattice; then the next begins
 ANGLES = (12, 1024)
@@ -28,7 +29,7 @@ class Search:
     """One search, in rounds of some hundredths of a second; see rounds().
 
     Attributes:
-        best: the cheapest path so far, or None.
+        best: the cheapest path so far, or None; cost: what it is judged by, infinite without one.
         work: poses expanded and moves tried so far.
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
@@ -39,21 +40,50 @@ class Search:
     def __init__(self, query: Query, seed: int) -> None:
         self.query = query
         self.best: Path | None = None
+        self.cost = np.inf
         self.work = 0
         self.nodes = 0
         self.finest = np.inf
         self.chains: list[Chain] = []
         self.closed, self.disc, self.direct = False, 0.0, False
         self._seed = seed
+        self._moves = MOVES // REPLANNED if query.robust else MOVES
         self._drawn: Lattice | None = None
 
     @cached_property
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self._seed)
 
-    @property
-    def cost(self) -> float:
-        return np.inf if self.best is None else self.best.cost
+    def value(self, path: Path) -> float:
+        """What a path that keeps clear is judged by: its cost, or, for a robust query, that of replanning.
+
+        After each change the push is planned again from where the switch pose is missed to where three pieces of it,
+        or fewer, were to end.
+        """
+        if not self.query.robust:
+            return path.cost
+        from .kernels import cost_replanned
+
+        total, pieces = path.cost, path.pieces
+        for i in range(1, len(pieces)):
+            push = pieces[i][0]
+            if push != pieces[i - 1][0]:
+                end = next(
+                    (j for j in range(i, len(pieces)) if j == i + 3 or pieces[j][0] != push), len(pieces)
+                )
+                own = Path(path.fleet, path.poses[i], pieces[i:end]).cost
+                total += (
+                    cost_replanned(self.query.arrays, push, path.poses[i], path.poses[end], path.cost) - own
+                )
+        return total
+
+    def _take(self, path: Path) -> bool:
+        """Keeps a path if it is better than the best."""
+        value = self.value(path)
+        if value >= self.cost:
+            return False
+        self.best, self.cost = path, value
+        return True
 
     def rounds(self) -> Iterator[Path | None]:
         """The best path so far after every round; ends only where there is provably none.
@@ -68,7 +98,7 @@ class Search:
         trees = Trees(self.query, self._seed)
         self.work, self.nodes = trees.work, trees.size
         if trees.path is not None:
-            self.best = trees.path
+            self._take(trees.path)
             yield self.best
             self._add(trees.path)
         yield self.best
@@ -84,8 +114,7 @@ class Search:
             for family in families:
                 found = next(family)
                 if found is not None:
-                    if found.cost < self.cost:
-                        self.best = found
+                    if self._take(found):
                         yield self.best
                     self._add(found)
                 yield self.best
@@ -131,14 +160,14 @@ class Search:
     def _add(self, path: Path) -> None:
         chain = Chain(self.query, path, int(self._rng.integers(1 << 60)))
         if chain.legs:
-            chain.improve(MOVES)
+            chain.improve(self._moves)
             self.work += MOVES
             self._keep([*self.chains, chain])
 
     def _polish(self, turn: int) -> None:
         """Every other round the best chain, in between the others in turn."""
         which = 0 if turn % 2 == 0 else turn // 2 % len(self.chains)
-        self.chains[which].improve(MOVES)
+        self.chains[which].improve(self._moves)
         self.work += MOVES
         self._keep(self.chains)
 
@@ -150,9 +179,7 @@ class Search:
                 kept.append(chain)
         self.chains = kept[:CHAINS]
         if self.chains and self.chains[0].cost < self.cost * (1 - 1e-12):
-            path = self.chains[0].path
-            if path.cost < self.cost:
-                self.best = path
+            self._take(self.chains[0].path)
 
     def offer(self, path: Path) -> bool:
         """Takes a path from elsewhere if it keeps the clearance."""
@@ -163,8 +190,7 @@ class Search:
         pushes, letters, amounts = (np.array(column) for column in zip(*path.pieces, strict=True))
         if not path_clear(self.query.arrays, path.start, pushes, letters, amounts):
             return False
-        if path.cost < self.cost:
-            self.best = path
+        self._take(path)
         self._add(path)
         return True
 

@@ -9,11 +9,11 @@ from ....compiled import inner, kernel
 from ....geometry.pose import Array
 from ....steering.six_words import MOST_WORDS, STRAIGHT, WORD, Records, drive, price
 from ...query_arrays import QueryArrays
-from ..kernels import changes, connect, put, random
+from ..kernels import changes, connect, put, random, replanned
 
 MOST = 256
 FAR = 48  # legs of a path that one word may replace at first
-TRIES = 3
+TRIES = 3  # words of a push that are looked at for one that keeps clear
 SMALL, LARGE = 3e-5, 0.2  # shifts, in turning radii and radians
 GAIN = 1e-9  # of the cost, that a move must save
 KNOT = 5e-4  # of the cost, that a knot must save: every piece starts and ends at rest
@@ -37,13 +37,32 @@ class Legs(NamedTuple):
     words: Records
 
 
-@kernel()
+@inner
 def total(T: QueryArrays, legs: Legs, n: int) -> float:
     """What a chain of n legs costs."""
     cost = legs.words[0].cost
     for i in range(1, n):
         cost += legs.words[i].cost + T.switching[legs.pushes[i - 1], legs.pushes[i]]
     return cost
+
+
+@inner
+def _worth(T: QueryArrays, legs: Legs, n: int, buffer: Records, off: Array, here: Array) -> float:
+    """What a chain is judged by: its cost, or that of replanning. An attempt that is lost costs the chain once more."""
+    cost = once = total(T, legs, n)
+    if len(T.offsets) > 0:
+        for i in range(1, n):
+            a = legs.pushes[i]
+            if a != legs.pushes[i - 1]:
+                again = replanned(T, a, legs.poses[i], legs.poses[i + 1], once, buffer, off, here)
+                cost += again - legs.words[i].cost
+    return cost
+
+
+@kernel()
+def worth(T: QueryArrays, legs: Legs, n: int) -> float:
+    """What a chain of n legs is judged by."""
+    return _worth(T, legs, n, np.empty(MOST_WORDS, WORD), np.empty(3), np.empty(3))
 
 
 @inner
@@ -88,11 +107,22 @@ def _split(T: QueryArrays, legs: Legs, n: int, leg: int, share: float) -> int:
 
 @inner
 def _replace(
-    T: QueryArrays, legs: Legs, n: int, first: int, after: int, push: int, buffer: Records, here: Array
+    T: QueryArrays,
+    legs: Legs,
+    n: int,
+    first: int,
+    after: int,
+    push: int,
+    spare: float,
+    buffer: Records,
+    here: Array,
 ) -> int:
-    """One word of a push instead of the legs from `first` up to `after`, not included; legs left, or -1."""
+    """One word of a push instead of the legs from `first` up to `after`, not included; legs left, or -1.
+
+    It may cost more than these by less than `spare`.
+    """
     poses, pushes, words = legs.poses, legs.pushes, legs.words
-    old = 0.0
+    old = spare
     for i in range(max(first, 1), min(after + 1, n)):
         old += T.switching[pushes[i - 1], pushes[i]]
     for i in range(first, after):
@@ -156,10 +186,12 @@ def _shift(
 def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> int:
     """Tries a number of moves; returns the number of legs that the chain then has."""
     new = Legs(np.empty((MOST + 1, 3)), np.empty(MOST, np.int64), np.empty(MOST, WORD))
-    buffer, here = np.empty(MOST_WORDS, WORD), np.empty(3)
-    k = len(T.cars)
-    knot = KNOT * total(T, legs, n)
-    cost = total(T, legs, n) + knot * n
+    buffer, off, here = np.empty(MOST_WORDS, WORD), np.empty(3), np.empty(3)
+    k, cost = len(T.cars), total(T, legs, n)
+    knot = KNOT * cost
+    # What replanning costs more, or 0: a better chain may itself cost so much more, if replanning it costs less.
+    spare = max(0.0, _worth(T, legs, n, buffer, off, here) - cost)
+    cost += spare + knot * n
     for _ in range(moves):
         kind = random(state)
         m = n
@@ -178,9 +210,9 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
             limit = 0.0
             for i in range(low - 1, high + 1):
                 limit += new.words[i].cost
-            limit -= GAIN * cost
+            limit += spare - GAIN * cost
             if m > n:
-                limit -= total(T, new, m) + knot * m - cost
+                limit -= total(T, new, m) + knot * m + spare - cost
             if not _shift(T, new, low, high, state, spread, limit, buffer, here):
                 continue
         elif kind < 0.6:
@@ -188,7 +220,7 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
                 continue
             gone = 1 + int(random(state) * (n - 1))
             push = new.pushes[gone - 1] if random(state) < 0.5 else new.pushes[gone]
-            m = _replace(T, new, n, gone - 1, gone + 1, push, buffer, here)
+            m = _replace(T, new, n, gone - 1, gone + 1, push, spare, buffer, here)
         else:
             if n + 2 >= MOST:
                 continue
@@ -210,12 +242,15 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
                 share = u / v if first == last and v < 0.9 else u
                 m = _split(T, new, m, first, share)
                 begin, end = first + 1, end + 1
-            m = _replace(T, new, m, begin, end, push, buffer, here)
+            m = _replace(T, new, m, begin, end, push, spare, buffer, here)
         if m <= 0 or m >= MOST:
             continue
         value = total(T, new, m) + knot * m
-        if value < cost * (1.0 - GAIN):
-            cost, n = value, m
+        if value >= cost * (1.0 - GAIN):
+            continue
+        more = max(0.0, _worth(T, new, m, buffer, off, here) + knot * m - value)
+        if value + more < cost * (1.0 - GAIN):
+            cost, spare, n = value + more, more, m
             _copy(new, n, legs)
     return n
 

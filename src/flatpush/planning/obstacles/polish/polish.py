@@ -12,12 +12,12 @@ class Chain:
     """A path that keeps clear, improved in place by improve().
 
     Attributes:
-        cost: of the chain; path: what it is.
+        cost: that the chain is judged by, of replanning for robust queries; path: what it is.
     """
 
     def __init__(self, query: Query, path: Path, seed: int) -> None:
         from ....steering.six_words import WORD
-        from .kernels import MOST, Legs, thread, total
+        from .kernels import MOST, Legs, thread, worth
 
         self.query = query
         self.state = np.array([seed], dtype=np.uint64)
@@ -31,15 +31,15 @@ class Chain:
             for i, (_, letter, amount) in enumerate(leg):
                 word["letter"][i], word["amount"][i] = letter, amount
         self.legs = int(thread(query.arrays, knots, arrived, given, len(legs), self._arrays))
-        self.cost = float(total(query.arrays, self._arrays, self.legs)) if self.legs else np.inf
+        self.cost = float(worth(query.arrays, self._arrays, self.legs)) if self.legs else np.inf
 
     def improve(self, moves: int) -> bool:
         """Tries a number of moves; True if the path got cheaper."""
-        from .kernels import polish, total
+        from .kernels import polish, worth
 
         before = self.cost
         self.legs = int(polish(self.query.arrays, self._arrays, self.legs, self.state, moves))
-        self.cost = float(total(self.query.arrays, self._arrays, self.legs))
+        self.cost = float(worth(self.query.arrays, self._arrays, self.legs))
         return self.cost < before * (1 - 1e-12)
 
     @property
