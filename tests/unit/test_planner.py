@@ -78,7 +78,7 @@ def test_a_push_that_follows_itself_does_not_let_go(rectangle, fingers):
     planner = fp.Planner(scene)
     last, here, pieces = planner.fleet.size - 1, np.array(scene.start_pose), []
     for goal in ((0.002, -0.03, 0.1), (0.0, 0.0, 0.0)):
-        words = direct_paths(planner.fleet, here, np.array(goal))
+        words = direct_paths(planner.fleet, here, np.tile(goal, (planner.fleet.size, 1)))
         pieces += next(path.pieces for path in words if path.pushes == (last,))
         here = np.array(goal)
     path = Path.of(planner.fleet, scene.start_pose, pieces)

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from ..simulation import Claim
 
 
+def goal_values(text: str | None) -> list[float | str] | None:
+    """A goal "x,y,θ" or "x,y,free" from the command line."""
+    *place, last = text.rsplit(",", 1) if text is not None else [""]
+    if last.strip() != "free":
+        return [*(numbers(text, 3, "--goal") or [])] or None
+    return [*(numbers(",".join(place), 2, "--goal x,y,free") or []), "free"]
+
+
 def numbers(text: str | None, count: int, option: str) -> list[float] | None:
     """A list such as "60,20,135" from the command line."""
     if text is None:
@@ -32,20 +40,23 @@ def numbers(text: str | None, count: int, option: str) -> list[float] | None:
 
 
 def pose_text(pose: Any) -> str:
-    """A pose in mm and degrees, the angle within half a turn."""
-    x, y, angle = (
-        round(value, 2) + 0.0
-        for value in (1000 * pose[0], 1000 * pose[1], math.remainder(math.degrees(pose[2]), 360))
-    )
-    return f"({x:.2f} mm, {y:.2f} mm, {angle:.2f}°)"
+    """A pose in mm and degrees, the angle within half a turn, or any."""
+    turn = 0.0 if math.isnan(pose[2]) else math.remainder(math.degrees(pose[2]), 360)
+    x, y, angle = (round(value, 2) + 0.0 for value in (1000 * pose[0], 1000 * pose[1], turn))
+    return f"({x:.2f} mm, {y:.2f} mm, " + ("any angle)" if math.isnan(pose[2]) else f"{angle:.2f}°)")
 
 
-def error_text(distance: float, turn: float) -> str:
-    """A distance [m] and an angle [rad] in mm and degrees; what is below a thousandth is said to be so."""
-    mm, degrees = 1000 * distance, math.degrees(abs(turn))
-    return ("<0.001 mm" if mm < 0.001 else f"{mm:.3f} mm") + (
-        " and <0.001°" if degrees < 0.001 else f" and {degrees:.3f}°"
-    )
+def error_text(distance: float, turn: float | None) -> str:
+    """A distance [m] and an angle [rad] in mm and degrees; what is below a thousandth is said to be so.
+
+    None as the angle stands for a goal that leaves it open.
+    """
+    mm = 1000 * distance
+    length = "<0.001 mm" if mm < 0.001 else f"{mm:.3f} mm"
+    if turn is None:
+        return f"{length} with any angle"
+    degrees = math.degrees(abs(turn))
+    return length + (" and <0.001°" if degrees < 0.001 else f" and {degrees:.3f}°")
 
 
 def growth_text(growth: float) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import cost_text, error_text, growth_text, numbers, pose_text, print_json, telling
+from .common import cost_text, error_text, goal_values, growth_text, numbers, pose_text, print_json, telling
 
 
 def command(
@@ -32,7 +32,7 @@ def command(
 
     overrides: dict[str, Any] = {
         "start": numbers(start, 3, "--start"),
-        "goal": numbers(goal, 3, "--goal"),
+        "goal": goal_values(goal),
         "planning": {
             key: value
             for key, value in {
@@ -146,7 +146,7 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     if plan.segments:
         x, y, angle = certificate.goal_error
         typer.echo(
-            f"certificate: goal met within {error_text(math.hypot(x, y), angle)},"
+            f"certificate: goal met within {error_text(math.hypot(x, y), None if scene.free_angle else angle)},"
             f" friction margin {100 * certificate.friction_margin:.0f} % of μ"
             f" ({certificate.friction_margin_degrees:.1f}°)"
             + (

@@ -192,9 +192,7 @@ def _wrote(*paths: Path | None) -> None:
 
 
 def _result(plan: Any, rollout: Any) -> dict[str, Any]:
-    from ..geometry import pose_error
-
-    error = pose_error(rollout.final_pose, plan.scene.goal)
+    error = plan.scene.goal_error(rollout.final_pose)
     return {
         "final_pose": [float(x) for x in rollout.final_pose],
         "outcome": rollout.outcome,

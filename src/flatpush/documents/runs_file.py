@@ -9,6 +9,7 @@ import numpy as np
 from ..problem import Plan
 from .atomic import write_atomically
 from .plan_file import as_text, finite_list
+from .scene_writer import goal_values
 
 
 def save_runs(runs: Any, path: str | os.PathLike[str]) -> None:
@@ -30,7 +31,7 @@ def save_runs(runs: Any, path: str | os.PathLike[str]) -> None:
         "flatpush": "runs/1",
         "seed": runs.seed,
         "noise": asdict(runs.noise),
-        "goal": finite_list(plan.scene.goal_pose, "goal"),
+        "goal": goal_values(plan.scene),
         "runs": [_run(runs, k) for k in range(len(runs))],
     }
     write_atomically(path, as_text(document))

@@ -16,6 +16,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Pose = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Goal = Annotated[list[Number | Literal["free"]], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Row], Field(min_length=3, max_length=3)]
 Coefficients = Annotated[list[Finite], Field(min_length=15, max_length=15)]
@@ -388,7 +389,7 @@ class SceneModel(Part):
         default="auto", description="auto, or a list of {name: ..., at: [x, y]} or {edge: 0, along: 0.5}."
     )
     start: Pose = Field(description="The object's pose at the start, [x, y, angle].")
-    goal: Pose = Field(description="The object's pose to reach, [x, y, angle].")
+    goal: Goal = Field(description="The object's pose to reach, [x, y, angle]; [x, y, free] for any angle.")
     workspace: WorkspacePart = Field(
         default_factory=WorkspacePart,
         description="{bounds: [xmin, ymin, xmax, ymax], obstacles: [...]}.",

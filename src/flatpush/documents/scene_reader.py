@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -117,7 +117,7 @@ def _scene(ctx: Context, model: m.SceneModel) -> Scene:
     scene = Scene(
         object=obj,
         start=_pose(ctx, model.start, "start"),
-        goal=_pose(ctx, model.goal, "goal"),
+        goal=_goal(ctx, model.goal),
         pusher=pusher,
         pushes="auto" if isinstance(pushes, str) else read_pushes(ctx, pushes, obj.outline, pusher),
         workspace=workspace,
@@ -220,6 +220,15 @@ def _planning(ctx: Context, part: m.PlanningPart) -> Planning:
         given["switch_cost"] = Planning(cost=part.cost).switching
     with ctx.at("planning"):
         return Planning(**given)
+
+
+def _goal(ctx: Context, values: list[float | Literal["free"]]) -> Array:
+    angle = values[2]
+    place = [x for x in values[:2] if not isinstance(x, str)]
+    if len(place) < 2:
+        raise ctx.refuse("only the angle of a goal can be free", "goal", hint="Write [x, y, free].")
+    pose = _pose(ctx, [*place, 0.0 if isinstance(angle, str) else angle], "goal")
+    return pose if not isinstance(angle, str) else np.array([*pose[:2], np.nan])
 
 
 def _pose(ctx: Context, values: list[float], key: str) -> Array:

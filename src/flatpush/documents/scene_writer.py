@@ -54,7 +54,7 @@ def scene_document(scene: Scene) -> dict[str, Any]:
         "pusher": {key: _number(value) for key, value in asdict(scene.pusher).items()},
         "pushes": pushes,
         "start": scene.start_pose.tolist(),
-        "goal": scene.goal_pose.tolist(),
+        "goal": goal_values(scene),
     }
     workspace: dict[str, Any] = {}
     if scene.workspace.bounds is not None:
@@ -81,6 +81,12 @@ def scene_document(scene: Scene) -> dict[str, Any]:
     }
     _check_finite(document, "")
     return document
+
+
+def goal_values(scene: Scene) -> list[float | str]:
+    """A goal as a document holds it, [x, y, angle] or [x, y, "free"], in m and rad."""
+    x, y, angle = scene.goal_pose.tolist()
+    return [x, y, "free" if scene.free_angle else angle]
 
 
 def _outline(outline: Outline) -> Any:

@@ -52,7 +52,7 @@ pushes:
   - {name: hypotenuse, at: [-3.72, 7.70], fingers: 2, spacing: 18}
 
 start: [30, 50, 45]               # x, y, angle of the object's drawing on the table
-goal: [0, 0, 0]
+goal: [0, 0, 0]                   # [0, 0, free]: any angle
 
 # Where object and pusher must stay:
 # workspace:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compiling import clock
-from ..errors import FlatpushError
-from ..geometry import pose_error
+from ..errors import FlatpushError, InputError
 from ..geometry.pose import Array
 from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
 from ..simulation import certify
 from ..steering.fleet import Fleet
+from ..steering.free_heading import HEADINGS, cheapest_headings
 from .among_obstacles import AmongObstacles, Progress
 from .answer import Answer
 from .assembly import Segments, assemble, car_of
@@ -104,9 +104,9 @@ class Planner:
         """
         began = clock()
         scene = self.scene if start is None else replace(self.scene, start=start)
-        if _crowded(scene):
+        if _crowded(scene) and not scene.free_angle:
             check_endpoints(scene)
-        if np.all(np.abs(pose_error(scene.start, scene.goal)) <= scene.planning.goal_tolerance):
+        if np.all(np.abs(scene.goal_error(scene.start)) <= scene.planning.goal_tolerance):
             yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return
         if not self.usable:
@@ -116,7 +116,8 @@ class Planner:
         best, stopped_by, details = np.inf, "", dict[str, Any]()
         reasons, blocked = self.reasons, ""
         if _crowded(scene):
-            self._among = AmongObstacles(scene, self.usable, self.fleet, self.transits, self._progress)
+            aimed = self._fitting(scene) if scene.free_angle else scene
+            self._among = AmongObstacles(aimed, self.usable, self.fleet, self.transits, self._progress)
             for found, segments in self._among.plans():
                 best, details = found.cost, found.details
                 yield Answer(best, partial(_solved, scene, segments, began, details), details)
@@ -145,15 +146,44 @@ class Planner:
 
     def _candidates(self, scene: Scene) -> Iterator[Found]:
         """The cheapest single push, then what the refinement finds; all words of the push if it is the only one."""
-        singles = direct_paths(self.fleet, scene.start_pose, scene.goal_pose)
+        ends = self._ends(scene)
+        singles = direct_paths(self.fleet, scene.start_pose, ends)
         several = len(self.usable) > 1
         single = {"single_cost": singles[0].cost}
         for path in singles[:1] if several else singles:
             yield Found(path, path.cost, dict(single))
         if several:
-            for found in refined_paths(scene, self.fleet):
+            for found in refined_paths(replace(scene, goal=singles[0].poses[-1]), self.fleet):
                 found.details.update(single)
                 yield found
+
+    def _ends(self, scene: Scene) -> Array:
+        """For every push where it best ends: the goal, or with the cheapest angle where any will do, shape (k, 3)."""
+        if not scene.free_angle:
+            return np.tile(scene.goal_pose, (self.fleet.size, 1))
+        place = scene.goal_pose[:2]
+        _, headings = cheapest_headings(self.fleet, scene.start_pose, place)
+        return np.column_stack([np.tile(place, (self.fleet.size, 1)), headings])
+
+    def _fitting(self, scene: Scene) -> Scene:
+        """The scene with an angle at the goal at which the object fits there: the cheapest of an empty table that does.
+
+        Raises:
+            InputError: if it fits with none, what is in the way with the cheapest.
+        """
+        costs, headings = cheapest_headings(self.fleet, scene.start_pose, scene.goal_pose[:2])
+        turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
+        complaint: InputError | None = None
+        for angle in np.concatenate([headings[np.argsort(costs[:, 0]), 0], turns]):
+            aimed = replace(scene, goal=(*scene.goal_pose[:2], angle))
+            try:
+                check_endpoints(aimed)
+            except InputError as error:
+                complaint = complaint or error
+            else:
+                return aimed
+        assert complaint is not None
+        raise complaint
 
     @cached_property
     def transits(self) -> Transits:

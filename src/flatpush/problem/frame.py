@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..geometry import Outline, transform
 from ..geometry.pose import Array
 from .scene import Object, Scene
@@ -23,10 +24,20 @@ def moved_inside(scene: Scene) -> Scene:
     """The same scene with the origin of O in the object, if it was more than 100 sizes away; else the scene itself.
 
     Start and goal are then poses of the outline's centroid, with the axes of the drawing.
+
+    Raises:
+        InputError: if the goal leaves the angle open: the object would turn about an origin far away.
     """
     origin = far_origin(scene.object.outline)
     if origin is None:
         return scene
+    if scene.free_angle:
+        raise InputError(
+            f"a goal with a free angle is a place of the drawing's origin, and that is {np.hypot(*origin):.4g} m from"
+            " the object",
+            key="goal",
+            hint="Draw the outline about its origin, or read its file with origin: centroid.",
+        )
     obj = scene.object
     support = obj.support_word or obj.support.translated(-origin)
     moved = Object(

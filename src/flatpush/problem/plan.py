@@ -103,6 +103,13 @@ class Plan:
         """Where the plan leaves the object, X_WO, shape (3,)."""
         return self.pushes[-1].object[-1] if self.pushes else np.asarray(self.scene.start, dtype=float)
 
+    @property
+    def goal_pose(self) -> Array:
+        """The goal X_WO, shape (3,); where it leaves the angle open, with that of the plan's end."""
+        if not self.scene.free_angle:
+            return self.scene.goal_pose
+        return np.array([*self.scene.goal_pose[:2], self.final_pose()[2]])
+
 
 @dataclass(frozen=True, eq=False)
 class Rollout:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..friction.support import Support
 from ..friction.surface import LimitSurface
-from ..geometry import Outline, OutlinePoint
+from ..geometry import Outline, OutlinePoint, pose_error
 from ..geometry.pose import Array
 
 Model = Literal["exact", "ellipsoid", "local", "quartic"]
@@ -279,7 +279,8 @@ class Scene:
 
     Args:
         object: what is pushed.
-        start, goal: poses (x, y, θ) of the object frame O on the table W [m, rad].
+        start, goal: poses (x, y, θ) of the object frame O on the table W [m, rad]; a goal (x, y, "free") leaves the
+            angle open, and NaN stands for it where the goal is read.
         pusher: the fingers.
         pushes: places to push at, or "auto".
         workspace, planning: as their classes say.
@@ -296,9 +297,7 @@ class Scene:
     def __post_init__(self) -> None:
         for name in ("start", "goal"):
             value = getattr(self, name)
-            pose = np.array(value, dtype=float)
-            if pose.shape != (3,) or not np.all(np.isfinite(pose)):
-                raise InputError("a pose is three finite numbers, [x, y, θ]", key=name, value=value)
+            pose = _pose(value, name)
             if abs(pose[2]) > 4 * np.pi:
                 raise InputError(
                     "an angle of a pose is within two turns (4π rad)",
@@ -317,7 +316,38 @@ class Scene:
 
     @property
     def goal_pose(self) -> Array:
+        """X_WO, shape (3,) [m, m, rad]; its angle is NaN where any will do."""
         return np.asarray(self.goal, dtype=float)
+
+    @property
+    def free_angle(self) -> bool:
+        """Whether the object may have any angle at the goal."""
+        return bool(np.isnan(self.goal_pose[2]))
+
+    def goal_error(self, pose: ArrayLike) -> Array:
+        """A pose X_WO less the goal, shape (3,) [m, m, rad]: the angle wrapped, and 0 where any will do."""
+        return (
+            np.nan_to_num(pose_error(pose, self.goal_pose))
+            if self.free_angle
+            else pose_error(pose, self.goal)
+        )
+
+
+def _pose(value: ArrayLike, name: str) -> Array:
+    """A pose; "free" for the angle of a goal becomes NaN."""
+    parts = list(value) if isinstance(value, list | tuple | np.ndarray) else [value]
+    free = name == "goal" and len(parts) == 3 and (parts[2] == "free" or _is_nan(parts[2]))
+    pose = np.array([*parts[:2], 0.0] if free else value, dtype=float)
+    if pose.shape != (3,) or not np.all(np.isfinite(pose)):
+        rule = "a pose is three finite numbers, [x, y, θ]" + (', or [x, y, "free"]' if name == "goal" else "")
+        raise InputError(rule, key=name, value=value)
+    if free:
+        pose[2] = np.nan
+    return pose
+
+
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and np.isnan(value)
 
 
 def _support(outline: Outline, word: str) -> Support:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact import PointContact, steering_forces
 from ..friction.surface import LimitSurface
-from ..geometry import compose, exp, log, pose_error, relative, rotate, shift_twist, velocity_at
+from ..geometry import compose, exp, log, relative, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
 from ..problem import CarCentres, Certificate, PushSegment, Scene, TransitSegment
 from ..problem.mechanics import (
@@ -82,7 +82,7 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
     elif scene.planning.cost == "pusher":
         cost += sum(_transit_length(s) for s in transits)
     proof = proof_of(scene, pushes)
-    x, y, angle = (float(value) for value in pose_error(pose, scene.goal))
+    x, y, angle = (float(value) for value in scene.goal_error(pose))
     return Certificate(
         goal_error=(x, y, angle),
         cost=float(cost),

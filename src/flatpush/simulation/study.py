@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..geometry import pose_error, wrap_angle
+from ..geometry import wrap_angle
 from ..geometry.pose import Array
 from ..problem import Plan
 from ..problem.scene import Model
@@ -84,7 +84,7 @@ class Runs:
     @property
     def errors(self) -> Array:
         """Distance and angle off the goal, shape (n, 2) [m, rad]."""
-        errors = np.array([pose_error(pose, self.plan.scene.goal) for pose in self.final])
+        errors = np.array([self.plan.scene.goal_error(pose) for pose in self.final])
         return np.stack([np.hypot(errors[:, 0], errors[:, 1]), np.abs(errors[:, 2])], axis=1)
 
     def quantiles(self, shares: Sequence[float] = QUANTILES) -> dict[str, Array]:

@@ -120,13 +120,14 @@ def _still(plan: Plan, traces: tuple[PushTrace, ...], rollouts: Sequence[Rollout
             f'<circle r="1"/><text dy="0.36em">{trace.number + 1}</text></g>'
         )
     panel, labels = _labels(plan, traces, box)
-    for name, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
+    for name, pose in (("start", scene.start_pose), ("goal", plan.goal_pose)):
         corners = _outline(scene, pose)
         mark = transform(pose, orientation_mark(scene))
         parts.append(
-            f'<g class="end {name}"><path d="{_path(corners, closed=True)}"/><path d="{_path(mark)}"/>'
+            f'<g class="end {name}"><path d="{_path(corners, closed=True)}"/>'
+            + ("" if name == "goal" and scene.free_angle else f'<path d="{_path(mark)}"/>')
         )
-        if name == "goal" or not np.allclose(scene.start_pose, scene.goal_pose):
+        if name == "goal" or not np.allclose(scene.start_pose, plan.goal_pose):
             parts.append(_name(panel, labels, corners, name))
         parts.append("</g>")
     for rollout in rollouts:

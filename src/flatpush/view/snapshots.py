@@ -118,7 +118,7 @@ def way_until(plan: Plan, timeline: Timeline, time: float) -> list[tuple[int, Ar
 def _moment(panel: Panel, plan: Plan, timeline: Timeline, time: float) -> None:
     scene = plan.scene
     draw_workspace(panel, scene)
-    for pose, colour in ((scene.start_pose, palette.START), (scene.goal_pose, palette.GOAL)):
+    for pose, colour in ((scene.start_pose, palette.START), (plan.goal_pose, palette.GOAL)):
         draw_object(panel, scene, pose, Look(colour, 0.8, (2.0, 1.5), 0.6), 3)
     pose, pusher, _, number = timeline.at(time)
     colour = SOFT

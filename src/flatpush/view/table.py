@@ -23,7 +23,7 @@ def view_box(plan: Plan, traces: Sequence[PushTrace], rollouts: Sequence[Rollout
     """What the drawing must show, with a border: xmin, ymin, xmax, ymax [mm]."""
     scene = plan.scene
     tip = scene.pusher.tip_radius
-    shown = [outline_at(scene, scene.start_pose), outline_at(scene, scene.goal_pose)]
+    shown = [outline_at(scene, scene.start_pose), outline_at(scene, plan.goal_pose)]
     shown += [obstacle.polyline() for obstacle in scene.workspace.obstacles]
     if scene.workspace.bounds is not None:
         shown.append(np.reshape(scene.workspace.bounds, (2, 2)))
@@ -82,14 +82,15 @@ def tip_size(panel: Panel, scene: Scene) -> float:
 
 
 def draw_endpoints(panel: Panel, plan: Plan, labels: Labels | None = None) -> None:
-    """The object at start (black) and goal (blue), each with a mark of how it is turned, and its name."""
+    """The object at start (black) and goal (blue) with their names, and marks of how it is to be turned."""
     scene = plan.scene
-    together = bool(np.allclose(scene.start_pose, scene.goal_pose))
-    endpoints = [(words.GOAL, scene.goal_pose, palette.GOAL), (words.START, scene.start_pose, palette.START)]
-    for name, pose, colour in [(words.BOTH, scene.goal_pose, palette.GOAL)] if together else endpoints:
+    together = bool(np.allclose(scene.start_pose, plan.goal_pose))
+    endpoints = [(words.GOAL, plan.goal_pose, palette.GOAL), (words.START, scene.start_pose, palette.START)]
+    for name, pose, colour in [(words.BOTH, plan.goal_pose, palette.GOAL)] if together else endpoints:
         draw_object(panel, scene, pose, Look(colour, 1.7, fill=colour, fill_opacity=0.10), 6)
         mark = MM * transform(pose, orientation_mark(scene))
-        panel.line(mark, Look(colour, 1.3), 6)
+        if name == words.START or not scene.free_angle:
+            panel.line(mark, Look(colour, 1.3), 6)
         panel.disc(mark[0], 2.0, Look(fill=colour), 6)
         if labels is not None:
             width, height = d.text_width(name, 9.0, bold=True), 9.0
@@ -114,7 +115,7 @@ def draw_number(page: Drawing, place: Array, number: int) -> None:
 def what_is_drawn(plan: Plan, traces: Iterable[PushTrace]) -> Array:
     """Points of all lines of a plan [mm], shape (n, 2), for labels to keep off."""
     scene = plan.scene
-    poses = [scene.start_pose, scene.goal_pose, *(pose for trace in traces for pose in trace.marks)]
+    poses = [scene.start_pose, plan.goal_pose, *(pose for trace in traces for pose in trace.marks)]
     lines = [_closed(outline_at(scene, pose)) for pose in poses]
     lines += [trace.flat_path for trace in traces if trace.flat_path is not None]
     lines += [_closed(obstacle.polyline()) for obstacle in scene.workspace.obstacles]

@@ -116,7 +116,7 @@ def distances(plan: Plan, run: ClosedLoopRun) -> Array:
     cof = plan.scene.object.cof
     actual = transform(run.object, cof)
     if _plans_anew(run):
-        return np.linalg.norm(actual - transform(plan.scene.goal_pose, cof), axis=1)
+        return np.linalg.norm(actual - transform(plan.goal_pose, cof), axis=1)
     paths = [_distance(actual, transform(push.object, cof)) for push in plan.pushes]
     return np.asarray(np.min(paths, axis=0))
 

@@ -187,7 +187,7 @@ class HorizonController(AbstractController[HorizonState]):
             state = replace(state, window=None)
         if self.learn:
             state = replace(state, steering=shared(state.steering))
-        error = pose_error(pose, self.scene.goal)
+        error = self.scene.goal_error(pose)
         off = float(np.hypot(error[0], error[1])), abs(float(error[2]))
         inside = max(off[0] / self.tolerance[0], off[1] / self.tolerance[1])
         text = f"{1000 * off[0]:.2f} mm and {np.rad2deg(off[1]):.2f}° off the goal"

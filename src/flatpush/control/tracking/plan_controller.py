@@ -298,7 +298,7 @@ def _learning(
 
 def goal_error(plan: Plan, pose: Array) -> tuple[float, float]:
     """Distance [m] and angle [rad] of a pose from the goal."""
-    error = pose_error(pose, plan.scene.goal)
+    error = plan.scene.goal_error(pose)
     return float(np.hypot(error[0], error[1])), abs(float(error[2]))
 
 

@@ -1,0 +1,140 @@
+"""A goal that leaves the angle open: as a document, as a plan, as a claim and as a picture."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.documents import parse_scene, scene_document
+from flatpush.documents.scene_digest import scene_differences, scene_digest
+from flatpush.errors import InputError
+from flatpush.planning.empty_table import direct_paths
+from flatpush.problem import Planning, Workspace
+from flatpush.view import save_figure
+
+CUP = {
+    "flatpush": "scene/1",
+    "units": {"length": "mm", "angle": "deg"},
+    "object": {"outline": {"circle": 40}, "friction": 0.3},
+    "start": [60, 20, 135],
+    "goal": [1, 2, "free"],
+}
+
+
+def _cup(**changes) -> fp.Scene:
+    return replace(parse_scene(CUP), **changes)
+
+
+def test_a_document_says_free():
+    scene = parse_scene(CUP)
+    assert scene.free_angle
+    assert scene.goal_pose[:2].tolist() == [0.001, 0.002]
+    assert scene.goal_error((0.001, 0.002, 5.0)).tolist() == [0, 0, 0]
+    document = scene_document(scene)
+    assert document["goal"] == [0.001, 0.002, "free"]
+    again = parse_scene(document)
+    assert scene_digest(again) == scene_digest(scene)
+    assert scene_digest(_cup(goal=(0.001, 0.002, "free"))) == scene_digest(scene)
+    fixed = replace(scene, goal=(0.001, 0.002, 0.0))
+    assert [d.key for d in scene_differences(scene, fixed)] == ["goal[2]"]
+
+
+@pytest.mark.parametrize(
+    ("goal", "rule"),
+    [
+        (["free", 0, 0], "only the angle of a goal can be free"),
+        ([0, 0, "any"], "goal"),
+        ([0, 0, float("nan")], "goal"),
+        ([0, 0], "goal"),
+    ],
+)
+def test_other_words_are_refused(goal, rule):
+    with pytest.raises(InputError, match=rule):
+        parse_scene({**CUP, "goal": goal})
+
+
+def test_a_start_is_never_free():
+    with pytest.raises(InputError, match="start"):
+        parse_scene({**CUP, "start": [0, 0, "free"]})
+    with pytest.raises(InputError, match="three finite numbers"):
+        _cup(start=(0, 0, float("nan")))
+
+
+def test_the_angle_about_a_far_origin_is_not_left_open():
+    thing = fp.Object([(10, 10), (10.05, 10), (10.05, 10.04), (10, 10.04)])
+    with pytest.raises(InputError, match="the drawing's origin, and that is"):
+        fp.plan(fp.Scene(thing, (0, 0, 0), (0.1, 0, "free")))
+
+
+@pytest.mark.parametrize("fingers", [1, 2])
+@pytest.mark.parametrize("cost", ["flat", "pusher", "time"])
+def test_one_push_is_never_dearer_than_with_a_fixed_angle(fingers, cost):
+    thing = fp.Object([(0.03, -0.01), (0.03, 0.02), (-0.02, 0.02), (-0.03, -0.01)], friction=0.3)
+    pusher = fp.Pusher(fingers=fingers, spacing=0.012) if fingers == 2 else fp.Pusher()
+    place = thing.outline.nearest([0.0, -0.01])
+    push = fp.Push("below", place, fingers, 0.012 if fingers == 2 else 0.0)
+    scene = fp.Scene(thing, (0.05, 0.02, 2.0), (0, 0, "free"), pusher, (push,), planning=Planning(cost=cost))
+    planner = fp.Planner(scene)
+    (answer,) = planner.answers()
+    found = answer.plan()
+    angles = np.linspace(-np.pi, np.pi, 73)[:-1]
+    fixed = [direct_paths(planner.fleet, scene.start_pose, np.array([[0, 0, a]]))[0].cost for a in angles]
+    assert answer.cost <= min(fixed) + 1e-9
+    assert answer.cost > 0.8 * min(fixed)  # and it is a path of the same kind, not a cost of nothing
+    assert fp.verify(found).ok
+    x, y, angle = found.certificate.goal_error
+    assert np.hypot(x, y) < 1e-9
+    assert angle == 0.0
+    assert fp.simulate(found).final_pose[:2] == pytest.approx([0, 0], abs=1e-4 if fingers == 2 else 2e-3)
+
+
+def test_a_start_at_the_place_is_there_already():
+    plan = fp.plan(_cup(start=(0.001, 0.002, 3.0)))
+    assert (plan.status, plan.cost, plan.segments) == ("solved", 0.0, ())
+
+
+def test_a_plan_that_misses_the_place_fails():
+    """The claim of the goal is recomputed for x and y: moving the goal by 1 mm must be noticed."""
+    plan = fp.plan(_cup(pusher=fp.Pusher(fingers=2, spacing=0.018)))
+    assert fp.verify(plan).ok
+    moved = replace(plan, scene=replace(plan.scene, goal=(0.002, 0.002, "free")))
+    assert {"goal_error", "reaches the goal"} <= {claim.name for claim in fp.verify(moved).failed}
+
+
+@pytest.mark.slow
+def test_among_obstacles_the_object_ends_as_it_fits():
+    """A slot that is 30 mm wide takes a bar of 80 × 20 mm only lengthwise; the goal leaves that to the planner."""
+    bar = fp.Object([(0.04, -0.01), (0.04, 0.01), (-0.04, 0.01), (-0.04, -0.01)], friction=0.4, name="bar")
+    walls = [
+        [(-0.05, y0), (0.05, y0), (0.05, y1), (-0.05, y1)] for y0, y1 in ((0.015, 0.03), (-0.03, -0.015))
+    ]
+    scene = fp.Scene(
+        bar,
+        (-0.2, 0.02, 0.3),
+        (0, 0, "free"),
+        fp.Pusher(fingers=2, spacing=0.01),
+        workspace=Workspace(obstacles=walls),
+    )
+    plan = fp.plan(scene)
+    assert plan.status == "solved", plan.reason
+    assert fp.verify(plan).ok
+    end = plan.final_pose()
+    assert abs(np.sin(end[2])) < 0.2
+    assert end[:2] == pytest.approx([0, 0], abs=1e-9)
+    nearer = [np.array(wall) - [0, 0.01 * side] for wall, side in zip(walls, (1, -1), strict=True)]
+    tight = replace(scene, workspace=Workspace(obstacles=nearer))
+    with pytest.raises(InputError, match="at the goal the object"):
+        fp.plan(tight)
+
+
+def test_the_goal_is_drawn_without_a_heading(tmp_path):
+    """A fixed goal has a mark of how it is turned; a free one has one line less, and the same outlines."""
+    plan = fp.plan(_cup(pusher=fp.Pusher(fingers=2, spacing=0.018)))
+    fixed = replace(plan, scene=replace(plan.scene, goal=plan.goal_pose))
+    strokes = []
+    for shown, name in ((plan, "free.svg"), (fixed, "fixed.svg")):
+        save_figure(shown, tmp_path / name)
+        strokes.append(len(re.findall(r"<(?:path|polyline|line)\b", (tmp_path / name).read_text())))
+    assert strokes[0] == strokes[1] - 1
