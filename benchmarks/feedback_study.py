@@ -1,10 +1,10 @@
-"""Part of `flatpush experiment feedback`: one controller, or one disturbance, with the landings, the times and limits used.
+"""Part of `flatpush experiment feedback`: one controller or one disturbance, with landings, times and limits used.
 
     python benchmarks/feedback_study.py [RUNS] [CONTROLLER] ["" | displaced | lost] [FIRST]
 
 RUNS (default 400) tasks from number FIRST (0) on of the controller horizon (default; it learns), path or dfl, in one
-process; with a disturbance, which moves the hand itself, those of seed 1, as in the experiment. Prints every run that fails as it comes, then the
-table's row, the 95 % and the longest time, and the greatest share of each limit.
+process; with a disturbance, which moves the hand itself, those of seed 1, as in the experiment. Prints every run that
+fails as it comes, then the table's row, the median, 95 % and longest time, and the greatest share of each limit.
 """
 
 import sys

@@ -18,5 +18,6 @@ def test_nearly_all_of_two_hundred_tasks_end_within_the_tolerance():
 
 @pytest.mark.parametrize("kind", ["displaced", "lost"])
 def test_a_finger_that_is_moved_or_lifted_in_mid_push_is_recovered_from(kind):
-    asked = [t for t in (task(k, 1, near=0.1) for k in range(100)) if t.steerable]
-    assert sum(attempt(t, disturbance=kind)[0].good for t in asked) >= 0.95 * len(asked) >= 90
+    """Few tasks, to be quick; `python benchmarks/feedback_study.py 100 horizon displaced` runs more."""
+    asked = [t for t in (task(k, 1, near=0.1) for k in range(14)) if t.steerable]
+    assert sum(attempt(t, disturbance=kind)[0].good for t in asked) >= len(asked) - 1 >= 12

@@ -43,11 +43,12 @@ def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     assert "sticking" in text
     assert figure.read_bytes().lstrip().startswith(b"<")
     again = ("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json")
-    assert call(*again, "--tolerance", "3,3") == 0
+    assert call(*again, "--tolerance", "1,1") == 0
     first = json.loads(capsys.readouterr().out)
     assert first["outcome"] == "arrived"
-    assert first["distance"] < 0.003
-    assert call(*again, "--tolerance", "3,3") == 0
+    assert first["distance"] < 0.001
+    assert first["turn"] < np.deg2rad(1)
+    assert call(*again, "--tolerance", "1,1") == 0
     assert json.loads(capsys.readouterr().out) == first
     assert call(*again, "--tolerance", "0.001,0.001") == 3
     beside = json.loads(capsys.readouterr().out)

@@ -81,7 +81,15 @@ def test_references_of_a_plan_are_exact(one_finger_plan, timed):
 
 def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():
     """z̈ = w for an asymmetric contact (c ≠ 0): the mean over a small tick of what the flat point does is w."""
-    from flatpush.control.laws.formulas import AFTER, linearised, point_velocity
+    from flatpush.control.laws.formulas import (
+        AFTER,
+        AxisGains,
+        Bounds,
+        FlatPose,
+        FlatTarget,
+        linearised,
+        point_velocity,
+    )  # fmt: skip
 
     flat = fp.flat_output(fp.PointContact([0.006, -0.02], [0.1, 0.995], 0.6), Ellipsoid(NOMINAL))
     assert abs(flat.along) > 1e-3
@@ -90,8 +98,8 @@ def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():
     x, y, heading = model.flat_of([0.1, 0.2, theta])
     w = np.array([0.003, -0.002])
     after, out, omega, scale, bounded = linearised(
-        x, y, heading, s, x, y, s * np.cos(heading), s * np.sin(heading), *w, 4, 4, 4, 4,
-        model.left, model.right, 1e-3, 1, dt, AFTER,
+        FlatPose(x, y, heading), s, FlatTarget(x, y, s * np.cos(heading), s * np.sin(heading), *w),
+        AxisGains(4, 4, 4, 4), Bounds(model.left, model.right, 1e-3, 1), dt, AFTER,
     )  # fmt: skip
     assert scale == 1
     assert not bounded

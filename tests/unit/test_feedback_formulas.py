@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flatpush.control.laws.formulas import along_path, linearised
+from flatpush.control.laws.formulas import AxisGains, Bounds, FlatPose, FlatTarget, along_path, linearised
 from flatpush.control.loop.limits import Limits, braking
 from flatpush.control.loop.measurement import STOP, Command
 
@@ -19,9 +19,12 @@ def test_beside_a_bent_path_the_turn_is_that_of_a_parallel_curve(bend):
 
 def test_the_linearisation_turns_left_as_far_as_left_allows_and_right_as_far_as_right():
     turns = [
-        linearised(0, 0, 0, 0.02, 0, aside, 0.02, 0, 0, 0, 400, 400, 40, 40, 30.0, 10.0, 0.002, 0.06, 1e-9, 0)
+        linearised(
+            FlatPose(0, 0, 0), 0.02, FlatTarget(0, aside, 0.02, 0, 0, 0), AxisGains(400, 400, 40, 40),
+            Bounds(30.0, 10.0, 0.002, 0.06), 1e-9, 0,
+        )
         for aside in (1.0, -1.0)
-    ]
+    ]  # fmt: skip
     assert [omega / 0.02 for _, _, omega, _, _ in turns] == pytest.approx([30.0, -10.0])
     assert all(0 < scale < 1 for _, _, _, scale, _ in turns)
 

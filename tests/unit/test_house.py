@@ -17,15 +17,11 @@ CIRCLES = {
     frozenset({"flatpush.documents.mechanics", "flatpush.documents.surface_file"}),
 }
 BARE_COLUMNS = {
-    "control.laws.rollout_kernel.many",
     "steering.kernels._time",
     "steering.kernels.three_twist_between",
     "steering.kernels.timed_between",
 }
 LONG = {
-    "control.laws.formulas.linearised",
-    "control.laws.rollout.rollout",
-    "control.laws.rollout_kernel.many",
     "steering.kernels.three_twist_between",
     "steering.kernels.timed_between",
 }

@@ -1,4 +1,4 @@
-"""Feedback laws of a sticking push, on plain numbers; laws.formula_kernels compiles these same functions.
+"""Feedback laws of a sticking push, on plain numbers; kernels compile these same functions.
 
 A reference path is a table of shape (n, 6), one row for each piece of the flat point's path: arc length at its start
 [m], its length [m], the point (x, y) and the tangent's angle [rad] there, its curvature [1/m]. Heading φ: direction in
@@ -7,15 +7,58 @@ along h, > 0; a sticking finger drives s and the turn ω of the object independe
 """
 
 import math
-from typing import Any
+from typing import NamedTuple
 
+from ...formulas import formula
 from ...geometry.pose import Array
 
 # How a command is held over a tick, see laws.gains.Hold.
 RAMP, BEFORE, AFTER = 0, 1, 2
+# Bounds of the flat speed under feedback linearisation, by that of the reference: the law divides by it.
+FLOOR, CAP = 0.1, 3.0
+# A hand that slows down later than it was told to is at most so many times as fast as that.
+MOST_SHARE = 3.0
 
 
-def place(table: Array, length: float) -> Any:
+class FlatPose(NamedTuple):
+    """Of the flat point in W: x, y [m] and heading [rad]."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class FlatTarget(NamedTuple):
+    """Where the flat point should be, and its velocity and acceleration, in W [m], [m/s], [m/s²]."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    ax: float
+    ay: float
+
+
+class AxisGains(NamedTuple):
+    """Along two axes: proportional [1/s²] and derivative [1/s]."""
+
+    px: float
+    py: float
+    dx: float
+    dy: float
+
+
+class Bounds(NamedTuple):
+    """Most turn per length to either side [1/m], and bounds of the flat speed [m/s]."""
+
+    left: float
+    right: float
+    floor: float
+    cap: float
+
+
+@formula
+def place(table: Array, length: float) -> tuple[float, float, float, float]:
     """Point x, y, tangent angle and curvature at an arc length; beyond the ends the path goes on straight."""
     k = 0
     while k + 1 < table.shape[0] and length >= table[k + 1, 0]:
@@ -35,7 +78,10 @@ def place(table: Array, length: float) -> Any:
     return x, y, angle, bend
 
 
-def nearest(table: Array, x: float, y: float, length: float, reach: float) -> Any:
+@formula
+def nearest(
+    table: Array, x: float, y: float, length: float, reach: float
+) -> tuple[float, float, float, float]:
     """The path's point abeam of (x, y), near a first guess of its arc length, at most `reach` from it.
 
     Returns:
@@ -55,28 +101,10 @@ def nearest(table: Array, x: float, y: float, length: float, reach: float) -> An
     return length, (y - py) * math.cos(angle) - (x - px) * math.sin(angle), angle, bend
 
 
+@formula
 def linearised(
-    x: float,
-    y: float,
-    heading: float,
-    speed: float,
-    zx: float,
-    zy: float,
-    vx: float,
-    vy: float,
-    ax: float,
-    ay: float,
-    kpx: float,
-    kpy: float,
-    kdx: float,
-    kdy: float,
-    left: float,
-    right: float,
-    floor: float,
-    cap: float,
-    dt: float,
-    hold: int,
-) -> Any:
+    flat: FlatPose, speed: float, target: FlatTarget, gains: AxisGains, bounds: Bounds, dt: float, hold: int
+) -> tuple[float, float, float, float, bool]:
     """One tick of dynamic feedback linearisation ([Zhou2017] Eqs. 43-46, for any contact: docs/errata.md rows 2, 15).
 
     The compensator state is the flat speed s: ṡ = w·h, ω = (w·n)/s make z̈ = w. Where the turn is more than the
@@ -84,33 +112,33 @@ def linearised(
     floor.
 
     Args:
-        x, y, heading: of the flat point. speed: s.
-        zx … ay: reference, velocity, acceleration. kpx … kdy: gains along x and y of W.
-        left, right: most turn per length to either side [1/m]. floor, cap: bounds of s. dt: of the tick. hold: code.
+        flat: where the flat point is. speed: s. target: the reference. gains: along x and y of the frame of both.
+        bounds: of turn and s. dt: of the tick. hold: code.
 
     Returns:
         s for the next tick, flat speed and turn ω to command, how far ω was scaled (1: not), whether s was bounded.
     """
-    c, d = math.cos(heading), math.sin(heading)
-    s = min(max(speed, floor), cap)
+    c, d = math.cos(flat.heading), math.sin(flat.heading)
+    s = min(max(speed, bounds.floor), bounds.cap)
     bounded = s != speed
-    wx = ax - kpx * (x - zx) - kdx * (s * c - vx)  # Eq. 46
-    wy = ay - kpy * (y - zy) - kdy * (s * d - vy)
+    wx = target.ax - gains.px * (flat.x - target.x) - gains.dx * (s * c - target.vx)  # Eq. 46
+    wy = target.ay - gains.py * (flat.y - target.y) - gains.dy * (s * d - target.vy)
     along, across = wx * c + wy * d, wy * c - wx * d
     after = s + along * dt  # Eq. 43
-    if after < floor or after > cap:
+    if after < bounds.floor or after > bounds.cap:
         bounded = True
-        after = min(max(after, floor), cap)
+        after = min(max(after, bounds.floor), bounds.cap)
     out = 0.5 * (s + after) if hold == RAMP else (after if hold == BEFORE else s)
     mean = out if hold == RAMP else s  # over the tick
     scale = 1.0
-    most = mean * out * (left if across > 0 else right)
+    most = mean * out * (bounds.left if across > 0 else bounds.right)
     if abs(across) > most:
         scale = most / abs(across)
     omega = scale * across / mean  # Eq. 45
     return after, out, omega, scale, bounded
 
 
+@formula
 def along_path(
     left_of: float,
     heading_error: float,
@@ -119,7 +147,7 @@ def along_path(
     damping: float,
     left: float,
     right: float,
-) -> Any:
+) -> tuple[float, bool]:
     """Turn per length that brings the flat point back to its path, without a singularity at rest.
 
     In arc length e' = sin ψ, ψ' = κ - κ_d cos ψ / (1 - κ_d e): feeding the path's own curvature forward and adding
@@ -140,9 +168,10 @@ def along_path(
     return bounded, bounded != kappa
 
 
+@formula
 def point_velocity(
     heading: float, speed: float, omega: float, ox: float, oy: float, turn: float, dt: float, hold: int
-) -> Any:
+) -> tuple[float, float]:
     """Velocity in W of a body point while the flat point runs at a speed and the body turns at ω.
 
     Held on a ramp it is the mean over the tick: the chord of the point's way. Otherwise it is that at the tick's start.
@@ -166,6 +195,14 @@ def point_velocity(
     )
 
 
+@formula
+def flat_motion(hx: float, hy: float, rx: float, ry: float, ux: float, uy: float) -> tuple[float, float]:
+    """Flat speed and ω of a body whose point at an arm r from the flat point moves with u; h its heading; all in O."""
+    omega = (hx * uy - hy * ux) / (hx * rx + hy * ry)
+    return (ux + omega * ry) * hx + (uy - omega * rx) * hy, omega
+
+
+@formula
 def wrapped(angle: float) -> float:
     """The same angle in [-π, π]."""
     return angle - 2 * math.pi * math.floor(angle / (2 * math.pi) + 0.5)

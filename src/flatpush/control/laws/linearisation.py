@@ -18,17 +18,12 @@ from ...geometry.pose import Array
 from ..loop.controller import ARRIVED, ControllerState
 from ..loop.limits import Limits
 from ..loop.measurement import STOP, Command
-from .formulas import linearised
+from .formulas import CAP, FLOOR, MOST_SHARE, AxisGains, Bounds, FlatPose, FlatTarget, linearised
 from .gains import HOLDS, Gains, Hold
 from .path_following import path_command
 from .push_controller import AbstractPushController, pusher_velocity
 from .reference import AbstractReference, PathReference, check_reference
 from .steering_model import SteeringModel
-
-# Bounds of the flat speed, by that of the reference: the law divides by it.
-FLOOR, CAP = 0.1, 3.0
-# A hand that slows down later than it was told to is at most so many times as fast as that.
-MOST_SHARE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +64,10 @@ class _Linearised(AbstractPushController[TrackingState]):
             raise InputError("a time is finite", value=time)
         return TrackingState(begun=time)
 
+    @cached_property
+    def _axes(self) -> AxisGains:
+        return AxisGains(*(float(k) for k in (*self.gains.kp, *self.gains.kd)))
+
     def _check(self) -> None:
         self.gains.check(self.rate, self.hold)
         self.check_stale()
@@ -78,19 +77,15 @@ class _Linearised(AbstractPushController[TrackingState]):
         state: TrackingState,
         pose: Array,
         time: float,
-        target: tuple[Array, Array, Array],
+        target: FlatTarget,
         nominal: float,
         pace: float = 1.0,
     ) -> tuple[TrackingState, Command]:
         m, dt = self.model, pace / self.rate
-        x, y, heading = m.flat_of(pose)
-        z, dz, ddz = target
-        (kpx, kpy), (kdx, kdy) = self.gains.kp, self.gains.kd
         s0 = nominal if np.isnan(state.speed) else state.speed
         speed, out, omega, scale, bounded = linearised(
-            x, y, heading, s0, float(z[0]), float(z[1]), float(dz[0]), float(dz[1]), float(ddz[0]), float(ddz[1]),
-            float(kpx), float(kpy), float(kdx), float(kdy), m.left, m.right, FLOOR * nominal, CAP * nominal, dt,
-            HOLDS.index(self.hold),
+            FlatPose(*m.flat_of(pose)), s0, target, self._axes, Bounds(m.left, m.right, FLOOR * nominal, CAP * nominal),
+            dt, HOLDS.index(self.hold),
         )  # fmt: skip
         mode, note = "tracking", ""
         if scale < 1:
@@ -156,7 +151,8 @@ class TrackingController(_Linearised):
         # The mean acceleration over the tick: at a junction the acceleration jumps.
         mean = (even.at(min(t + pace * dt, T)).velocity - now.velocity) / (pace * dt)
         nominal = float(np.hypot(*middle.velocity))
-        return self._tick(state, pose, time, (now.position, now.velocity, mean), nominal, pace)
+        target = FlatTarget(*(float(x) for x in (*now.position, *now.velocity, *mean)))
+        return self._tick(state, pose, time, target, nominal, pace)
 
     def _clocked(self, state: TrackingState, pose: Array, time: float) -> TrackingState:
         """With the clock after the last tick, in which the limits may have left less of the motion than was wanted."""
@@ -239,13 +235,12 @@ class PostureController(_Linearised):
                 f"the goal's position is abeam, {1000 * abs(left):.2f} mm aside; a finger cannot pull",
             )
         # In the goal's axes, so that along and across have gains of their own.
-        (kpa, kpc), (kda, kdc) = self.gains.kp, self.gains.kd
         s0 = self.speed if np.isnan(state.speed) else state.speed
         m = self.model
         speed, out, omega, scale, bounded = linearised(
-            -ahead, -left, float(wrap_angle(heading - angle)), s0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-            float(kpa), float(kpc), float(kda), float(kdc), m.left, m.right, FLOOR * self.speed, CAP * self.speed,
-            1 / self.rate, HOLDS.index(self.hold),
+            FlatPose(-ahead, -left, float(wrap_angle(heading - angle))), s0, FlatTarget(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            self._axes, Bounds(m.left, m.right, FLOOR * self.speed, CAP * self.speed), 1 / self.rate,
+            HOLDS.index(self.hold),
         )  # fmt: skip
         mode = "saturated" if scale < 1 else "guarded" if bounded else "posture"
         return self._command(

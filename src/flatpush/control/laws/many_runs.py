@@ -6,19 +6,22 @@ For other surfaces, round fingers and cameras that are late, see control.loop.cl
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
 from ...geometry.pose import Array
+from ..loop.limits import HandLimits
+from .formulas import AxisGains
 from .gains import HOLDS
 from .linearisation import TrackingController
 from .path_following import PathController
 from .reference import PathReference
+from .rollout import DFL, PATH, Ended, Loop, PointPush
 
 OUTCOMES = ("out of time", "left the edge", "arrived")
+ENDED = np.dtype([(name, np.int64 if name in ("stuck", "outcome") else float) for name in Ended._fields])
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +39,9 @@ class ClosedLoopRuns:
 
     final: Array
     worst: Array
-    stuck: Any
+    stuck: NDArray[np.int64]
     slid: Array
-    outcome: Any
+    outcome: NDArray[np.int64]
     object: Array | None = None
 
 
@@ -57,7 +60,7 @@ def closed_loops(
     record: bool = False,
     threads: int | None = None,
 ) -> ClosedLoopRuns:
-    """Runs a controller of a path reference from n poses X_WO (n, 3).
+    """Runs a controller of a path reference at a constant speed from n poses X_WO (n, 3), within its hand's limits.
 
     Args:
         normal: inward, at the model's contact, in O (2,).
@@ -73,10 +76,13 @@ def closed_loops(
     from .rollout_kernel import many
 
     model = controller.model
-    dfl = isinstance(controller, TrackingController)
     path = controller.reference if isinstance(controller, TrackingController) else controller.path
     if not isinstance(path, PathReference):
         raise InputError("compiled runs follow a path reference", value=type(path).__name__)
+    if path.laws:
+        raise InputError(
+            "compiled runs follow a path at a constant speed, and this one has time laws", key="laws"
+        )
     objects = np.ascontiguousarray(np.array(starts, dtype=float))
     if objects.ndim != 2 or objects.shape[1] != 3 or not np.all(np.isfinite(objects)):
         raise InputError("starts are poses, shape (n, 3)", value=np.shape(starts))
@@ -95,49 +101,36 @@ def closed_loops(
     if n_O.shape != (2,) or not np.all(np.isfinite(n_O)) or float(np.hypot(*n_O)) == 0:
         raise InputError("a normal is a vector of the plane", key="normal", value=normal)
     n_O = n_O / np.hypot(*n_O)
-    row = np.array([*model.flat_point, model.heading, model.left, model.right, *model.contact, *n_O])
-    gains = (
-        np.array([*controller.gains.kp, *controller.gains.kd])
-        if isinstance(controller, TrackingController)
-        else np.array([*controller.gains, 0.0, 0.0])
-    )
-    hold = HOLDS.index(controller.hold) if isinstance(controller, TrackingController) else 0
+    push = PointPush(*(float(v) for v in (*model.flat_point, model.heading, model.left, model.right)),
+                     *(float(v) for v in (*model.contact, *n_O)))  # fmt: skip
+    if isinstance(controller, TrackingController):
+        law, hold = DFL, HOLDS.index(controller.hold)
+        gains = AxisGains(*(float(k) for k in (*controller.gains.kp, *controller.gains.kd)))
+    else:
+        law, hold = PATH, 0
+        gains = AxisGains(*controller.gains, 0.0, 0.0)
+    most = controller.limits
+    hand = HandLimits(np.inf, np.inf, np.inf)
+    if most is not None:
+        # A hand whose fingertip does not turn with the object may turn as it likes.
+        hand = HandLimits(most.speed, most.acceleration, most.turn_rate if model.turns else np.inf)
     ticks = round(duration * controller.rate)
+    table = np.ascontiguousarray(path.table)
+    loop = Loop(
+        law, hold, table, float(path.speed), push, gains, float(controller.rate), ticks, float(edge), hand
+    )
     noises = np.zeros((1, 1, 3))
     if max(noise) > 0:
         size = np.array([noise[0], noise[0], noise[1]])
         noises = np.random.default_rng(seed).standard_normal((n, ticks, 3)) * size
     ways = np.full((n, ticks + 1 if record else 0, 3), np.nan)
-    out = np.empty((n, 7))
-    args = (
-        0 if dfl else 1,
-        hold,
-        np.ascontiguousarray(path.table),
-        float(path.speed),
-        row,
-        gains,
-        float(controller.rate),
-        ticks,
-        objects,
-        A,
-        centres,
-        mus,
-        float(edge),
-        noises,
-        ways,
-        out,
-    )
+    out = np.recarray(n, dtype=ENDED)
+    args = (loop, objects, A, centres, mus, np.zeros((1, 2)), noises, ways, out)
     workers = threads or os.cpu_count() or 1
     size_ = max(1, -(-n // (4 * workers)))
     if n:
         many(0, min(size_, n), *args)  # compiles, if need be, in one thread
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(lambda k: many(k, min(k + size_, n), *args), range(size_, n, size_)))
-    return ClosedLoopRuns(
-        out[:, :3],
-        out[:, 3],
-        out[:, 4].astype(int),
-        out[:, 5],
-        out[:, 6].astype(int),
-        ways if record else None,
-    )
+    final = np.stack([out.x, out.y, out.turn], axis=1)
+    return ClosedLoopRuns(final, out.worst, out.stuck, out.along, out.outcome, ways if record else None)

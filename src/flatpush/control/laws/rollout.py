@@ -3,20 +3,92 @@
 laws.rollout_kernel compiles it."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
+from ...formulas import formula
 from ...geometry.pose import Array
-from .formulas import RAMP, along_path, linearised, nearest, place, point_velocity, wrapped
+from ..loop.limits import HandLimits, HandMotion, kept_motion
+from .formulas import (
+    CAP,
+    FLOOR,
+    MOST_SHARE,
+    RAMP,
+    AxisGains,
+    Bounds,
+    FlatPose,
+    FlatTarget,
+    along_path,
+    flat_motion,
+    linearised,
+    nearest,
+    place,
+    point_velocity,
+    wrapped,
+)
 
 DFL, PATH = 0, 1
 STICKING, SLIDING_LEFT, SLIDING_RIGHT, SEPARATION = 1, 2, 3, 4
 
 
+class PointPush(NamedTuple):
+    """What a controller knows of a push, in O: flat point, heading, most turns per length, contact, inward normal."""
+
+    flat_x: float
+    flat_y: float
+    heading: float
+    left: float
+    right: float
+    x: float
+    y: float
+    nx: float
+    ny: float
+
+
+class Loop(NamedTuple):
+    """What all runs share.
+
+    Attributes:
+        law: DFL or PATH. hold: code. table, speed: of the path reference. push: of the model.
+        gains: of dfl; with the path law px and py are k₁ and k₂. rate: of the ticks [Hz], and how many of them.
+        half: of the edge, either side [m]. limits: of the hand.
+    """
+
+    law: int
+    hold: int
+    table: Array
+    speed: float
+    push: PointPush
+    gains: AxisGains
+    rate: float
+    ticks: int
+    half: float
+    limits: HandLimits
+
+
+class Ended(NamedTuple):
+    """How a run ended.
+
+    Attributes:
+        x, y, turn: X_WO. worst: largest distance of the flat point from its path [m]. stuck: ticks that stuck.
+        along: the contact's way along the edge [m]. outcome: 0, or 1 if the finger left the edge, 2 if it arrived
+            (PATH).
+    """
+
+    x: float
+    y: float
+    turn: float
+    worst: float
+    stuck: int
+    along: float
+    outcome: int
+
+
+@formula
 def contact_twist(
     A: Array, cof: Array, px: float, py: float, nx: float, ny: float, mu: float, ux: float, uy: float
-) -> Any:
+) -> tuple[float, float, float, float, int]:
     """Body twist in O at O's origin, slip of the finger along the edge (+ to the left) and mode; u in O.
 
     [Zhou2017] Eqs. 12-13: M = J A Jᵀ, f = M⁻¹ u where that lies in the friction cone, else the cone's edge.
@@ -54,62 +126,50 @@ def contact_twist(
     return a + w * cof[1], b - w * cof[0], w, slip, mode
 
 
+@formula
 def rollout(
-    law: int,
-    hold: int,
-    table: Array,
-    speed: float,
-    model: Array,
-    gains: Array,
-    rate: float,
-    ticks: int,
-    start: Array,
-    A: Array,
-    cof: Array,
-    mu: float,
-    half: float,
-    noise: Array,
-    way: Array,
-) -> Any:
+    loop: Loop, start: Array, A: Array, cof: Array, mu: float, tips: Array, noise: Array, way: Array
+) -> Ended:
     """One run.
 
     Args:
-        law: DFL or PATH. hold: code. table, speed: of the path reference. model: flat point (2), heading, left, right,
-            contact point (2) and inward normal (2), shape (9,). gains: kpx, kpy, kdx, kdy, or k₁, k₂, -, -.
-        start: X_WO. A: limit surface (3, 3) about cof (2,). mu: of the plant. half: of the edge, either side [m].
+        start: X_WO. A: limit surface (3, 3) about cof (2,). mu: of the plant.
+        tips: the fingertip in the hand's frame, shape (1, 2): zeros.
         noise: of the measured pose in each tick, shape (ticks, 3) or (1, 3): the same in all.
         way: X_WO before each tick and at the end, (ticks + 1, 3), written; or of shape (0, 3).
-
-    Returns:
-        the last pose x, y, θ; the largest distance of the flat point from its path; the ticks that stuck; the contact's
-        way along the edge; 0, or 1 if the finger left the edge, 2 if it arrived (PATH).
     """
-    dt = 1.0 / rate
+    dt = 1.0 / loop.rate
+    push, table, speed = loop.push, loop.table, loop.speed
     qx, qy, qt = start[0], start[1], start[2]
-    lx, ly, heading0, left, right = model[0], model[1], model[2], model[3], model[4]
-    px, py, nx, ny = model[5], model[6], model[7], model[8]
+    px, py, nx, ny = push.x, push.y, push.nx, push.ny
+    hx, hy, rx, ry = math.cos(push.heading), math.sin(push.heading), px - push.flat_x, py - push.flat_y
+    bounds = Bounds(push.left, push.right, FLOOR * speed, CAP * speed)
+    last, clock = HandMotion(0.0, 0.0, 0.0, 0.0), 0.0
     along, gap = 0.0, 0.0
     s, out, length, worst, stuck, outcome = speed, 0.0, 0.0, 0.0, 0, 0
     finish = table[table.shape[0] - 1, 0] + table[table.shape[0] - 1, 1]
-    for k in range(ticks):
+    for k in range(loop.ticks):
         if way.shape[0] > 0:
             way[k, 0], way[k, 1], way[k, 2] = qx, qy, qt
         row = k if noise.shape[0] > 1 else 0
         mx, my, mt = qx + noise[row, 0], qy + noise[row, 1], qt + noise[row, 2]
         c, d = math.cos(mt), math.sin(mt)
-        x, y, heading = mx + c * lx - d * ly, my + d * lx + c * ly, mt + heading0
-        if law == DFL:
-            zx, zy, angle, bend = place(table, speed * k * dt)
+        x, y = mx + c * push.flat_x - d * push.flat_y, my + d * push.flat_x + c * push.flat_y
+        heading = mt + push.heading
+        if loop.law == DFL:
+            zx, zy, angle, bend = place(table, speed * clock)
+            _, _, soon, _ = place(table, speed * min(clock + dt, finish / speed))
             tx, ty = math.cos(angle), math.sin(angle)
+            # The mean acceleration over the tick, as TrackingController has it.
+            ax, ay = speed / dt * (math.cos(soon) - tx), speed / dt * (math.sin(soon) - ty)
+            target = FlatTarget(zx, zy, speed * tx, speed * ty, ax, ay)
             s, out, omega, _, _ = linearised(
-                x, y, heading, s, zx, zy, speed * tx, speed * ty, -speed * speed * bend * ty,
-                speed * speed * bend * tx, gains[0], gains[1], gains[2], gains[3], left, right, 0.1 * speed,
-                3.0 * speed, dt, hold,
-            )  # fmt: skip
+                FlatPose(x, y, heading), s, target, loop.gains, bounds, dt, loop.hold
+            )
             off = math.hypot(x - zx, y - zy)
         else:
             ahead = min(length + out * dt, finish)
-            reach = max(0.25 / max(left, right), 2 * speed * dt)
+            reach = max(0.25 / max(push.left, push.right), 2 * speed * dt)
             length, e, angle, bend = nearest(table, x, y, ahead, reach)
             remaining = finish - length
             if remaining <= 1e-9:
@@ -121,11 +181,23 @@ def rollout(
                 # The mean turn of what is driven in this tick, as path_following.path_command has it.
                 _, _, further, _ = place(table, length + out * dt)
                 bend = wrapped(further - angle) / (out * dt)
-            kappa, _ = along_path(e, psi, bend, gains[0], gains[1], left, right)
+            kappa, _ = along_path(e, psi, bend, loop.gains.px, loop.gains.py, push.left, push.right)
             omega = kappa * out
             off = abs(e)
         worst = max(worst, off)
-        ux, uy = point_velocity(heading, out, omega, px - lx, py - ly, mt, dt, hold if law == DFL else RAMP)
+        hold = loop.hold if loop.law == DFL else RAMP
+        ux, uy = point_velocity(heading, out, omega, rx, ry, mt, dt, hold)
+        asked = HandMotion(ux, uy, omega, 0.0)
+        last = kept_motion(last, asked, mt, dt, tips, loop.limits)
+        share = 1.0
+        if last.vx != ux or last.vy != uy:
+            middle = mt + 0.5 * last.spin * dt
+            c, d = math.cos(middle), math.sin(middle)
+            done, _ = flat_motion(hx, hy, rx, ry, c * last.vx + d * last.vy, c * last.vy - d * last.vx)
+            share = min(max(done / out, 0.0), MOST_SHARE)
+        ux, uy = last.vx, last.vy
+        clock += share * dt
+        out *= share
         # The plant: the finger goes straight in W, the twist of the middle of the tick.
         cx, cy = px - along * ny, py + along * nx
         if gap > 0.0:
@@ -143,7 +215,7 @@ def rollout(
             continue
         stuck += 1 if mode == STICKING else 0
         along += slip * dt
-        if abs(along) > half:
+        if abs(along) > loop.half:
             outcome = 1
             break
         turn = w * dt
@@ -155,4 +227,4 @@ def rollout(
     for k in range(way.shape[0]):
         if k == way.shape[0] - 1 or (outcome != 0 and np.isnan(way[k, 0])):
             way[k, 0], way[k, 1], way[k, 2] = qx, qy, qt
-    return qx, qy, qt, worst, stuck, along, outcome
+    return Ended(qx, qy, qt, worst, stuck, along, outcome)

@@ -13,6 +13,7 @@ from ...geometry.pose import Array
 from ...steering.car import Car
 from ...steering.flat import FlatOutput
 from ..learning.belief import SteeringEstimate
+from .formulas import flat_motion
 
 # Turns per length at which the drift is computed, and halvings of the force's angle for each.
 _SAMPLES, _HALVINGS = 21, 40
@@ -159,9 +160,7 @@ class SteeringModel:
         hx, hy, rx, ry, _, _ = self._numbers
         across = 0.0
         for _ in range(1 if self.drift is None else 3):
-            vx, vy = ux + across * hy, uy - across * hx
-            omega = (hx * vy - hy * vx) / (hx * rx + hy * ry)
-            speed = (vx + omega * ry) * hx + (vy - omega * rx) * hy
+            speed, omega = flat_motion(hx, hy, rx, ry, ux + across * hy, uy - across * hx)
             across = self.across(speed, omega)
         return speed, omega
 

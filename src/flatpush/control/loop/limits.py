@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import InputError
+from ...formulas import formula
 from ...geometry import pose_error, transform
 from ...geometry.pose import Array
 from ...problem import Pusher
@@ -13,6 +15,8 @@ from .measurement import Command, Measurement
 
 # The share of each limit that is used: the motion in a tick is judged at its two ends.
 USED = 0.999
+# What is slowed down to a limit is within it, however it is rounded.
+ROUNDED = 1 - 1e-9
 # Of the acceleration, so much may go into turning at a constant speed.
 TURNING = 0.9
 # Halvings of the way from the last motion to the one that is wanted.
@@ -82,46 +86,17 @@ class Limits:
             last: what was done until now, and climb: the rate at which the hand rose [m/s].
             yaw: of the hand now [rad]. dt: for which a command holds [s].
         """
-        vx, vy, spin = (float(v) for v in last.velocity)
-        c, s = math.cos(spin * dt), math.sin(spin * dt)
-        before = (c * vx - s * vy, s * vx + c * vy, spin, climb)
-        asked = (*(float(v) for v in wanted.velocity), (wanted.height - last.height) / dt)
         up = last.height > 0 or wanted.height > 0 or climb != 0
-        speed, most = (
-            (self.travel_speed, self.travel_acceleration * dt) if up else (self.speed, self.acceleration * dt)
+        most = (
+            HandLimits(self.travel_speed, self.travel_acceleration, self.turn_rate)
+            if up
+            else HandLimits(self.speed, self.acceleration, self.turn_rate)
         )
-        speed, most = USED * speed, USED * most
-        arms = [
-            (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y)
-            for x, y in self.tips.tolist()
-        ]
-        old = _ends(arms, (vx, vy, spin, climb), -spin * dt, dt)
-
-        def fits(motion: tuple[float, float, float, float]) -> bool:
-            if abs(motion[2]) > USED * self.turn_rate:
-                return False
-            new = _ends(arms, motion, 0.0, dt)
-            return all(
-                _size(u) <= speed and _size((u[0] - w[0], u[1] - w[1], u[2] - w[2])) <= most
-                for u, w in zip(new, old, strict=True)
-            )
-
-        fastest = max(_size(u) for u in _ends(arms, asked, 0.0, dt))
-        share = min(
-            1.0,
-            speed / max(fastest, 1e-300),
-            USED * self.turn_rate / max(abs(asked[2]), 1e-300),
-            math.sqrt(TURNING * most / dt / max(abs(asked[2]) * fastest, 1e-300)),
-        )
-        goal = tuple(share * x for x in asked)
-        if not fits(goal):  # type: ignore[arg-type]
-            low, high = 0.0, 1.0
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                mixed = tuple(a + middle * (b - a) for a, b in zip(before, goal, strict=True))
-                low, high = (middle, high) if fits(mixed) else (low, middle)  # type: ignore[arg-type]
-            goal = tuple(a + low * (b - a) for a, b in zip(before, goal, strict=True))
-        return Command(np.array(goal[:3]), max(0.0, last.height + goal[3] * dt))
+        (ax, ay, aspin), (bx, by, bspin) = last.velocity.tolist(), wanted.velocity.tolist()
+        before = HandMotion(ax, ay, aspin, climb)
+        asked = HandMotion(bx, by, bspin, (wanted.height - last.height) / dt)
+        vx, vy, spin, rise = kept_motion(before, asked, yaw, dt, self.tips, most)
+        return Command(np.array([vx, vy, spin]), max(0.0, last.height + rise * dt))
 
     def impossible(self, before: Measurement, frame: Measurement, noise: tuple[float, float]) -> str:
         """Why a frame cannot be true after the last good one, or "".
@@ -198,17 +173,93 @@ def braking(length: float, deceleration: float, dt: float) -> float:
     return deceleration * (math.sqrt(dt * dt + 2 * length / deceleration) - dt)
 
 
-def _ends(
-    arms: list[tuple[float, float]], motion: tuple[float, ...], angle: float, dt: float
-) -> list[tuple[float, float, float]]:
-    """Velocities of the fingertips at the start and at the end of a tick that begins with the arms at an angle."""
-    vx, vy, spin, climb = motion
-    found = []
-    for turned in (angle, angle + spin * dt):
-        c, s = math.cos(turned), math.sin(turned)
-        found += [(vx - spin * (s * x + c * y), vy + spin * (c * x - s * y), climb) for x, y in arms]
-    return found
+class HandMotion(NamedTuple):
+    """Velocity of the hand in W [m/s], its yaw rate [rad/s] and the rate at which it rises [m/s]."""
+
+    vx: float
+    vy: float
+    spin: float
+    climb: float
 
 
-def _size(u: tuple[float, float, float]) -> float:
+class HandLimits(NamedTuple):
+    """Of the fastest fingertip [m/s], [m/s²], and of the hand's turning [rad/s]; infinite where there is none."""
+
+    speed: float
+    acceleration: float
+    turn_rate: float
+
+
+@formula
+def kept_motion(
+    last: HandMotion, asked: HandMotion, yaw: float, dt: float, tips: Array, limits: HandLimits
+) -> HandMotion:
+    """The motion nearest to what is asked, on the way from the last one as seen from the hand, that keeps to limits.
+
+    Args:
+        yaw: of the hand at the start of the tick [rad]. tips: of the fingers in E, shape (k, 2).
+    """
+    fastest = 0.0
+    for i in range(tips.shape[0]):
+        for angle in (yaw, yaw + asked.spin * dt):
+            fastest = max(fastest, _speed(tip_motion(asked, tips[i, 0], tips[i, 1], angle)))
+    share = min(
+        1.0,
+        USED * limits.speed / max(fastest, 1e-300),
+        USED * limits.turn_rate / max(abs(asked.spin), 1e-300),
+        math.sqrt(TURNING * USED * limits.acceleration / max(abs(asked.spin) * fastest, 1e-300)),
+    )
+    share *= ROUNDED if share < 1.0 else 1.0
+    goal = HandMotion(share * asked.vx, share * asked.vy, share * asked.spin, share * asked.climb)
+    if _fits(last, goal, yaw, dt, tips, limits):
+        return goal
+    c, s = math.cos(last.spin * dt), math.sin(last.spin * dt)
+    before = HandMotion(c * last.vx - s * last.vy, s * last.vx + c * last.vy, last.spin, last.climb)
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if _fits(last, _between(before, goal, middle), yaw, dt, tips, limits):
+            low = middle
+        else:
+            high = middle
+    return _between(before, goal, low)
+
+
+@formula
+def tip_motion(motion: HandMotion, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+    """Velocity of the point (x, y) of E in W, the rise included, of a hand at a yaw."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return motion.vx - motion.spin * (s * x + c * y), motion.vy + motion.spin * (c * x - s * y), motion.climb
+
+
+@formula
+def _speed(u: tuple[float, float, float]) -> float:
     return math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+
+
+@formula
+def _between(before: HandMotion, goal: HandMotion, share: float) -> HandMotion:
+    return HandMotion(
+        before.vx + share * (goal.vx - before.vx),
+        before.vy + share * (goal.vy - before.vy),
+        before.spin + share * (goal.spin - before.spin),
+        before.climb + share * (goal.climb - before.climb),
+    )
+
+
+@formula
+def _fits(
+    last: HandMotion, motion: HandMotion, yaw: float, dt: float, tips: Array, limits: HandLimits
+) -> bool:
+    """Whether a motion keeps to the limits after the last one, at the starts and the ends of both ticks."""
+    if abs(motion.spin) > USED * limits.turn_rate:
+        return False
+    speed, most = USED * limits.speed, USED * limits.acceleration * dt
+    for i in range(tips.shape[0]):
+        x, y = tips[i, 0], tips[i, 1]
+        for k in range(2):
+            u = tip_motion(motion, x, y, yaw + k * motion.spin * dt)
+            w = tip_motion(last, x, y, yaw + (k - 1) * last.spin * dt)
+            if _speed(u) > speed or _speed((u[0] - w[0], u[1] - w[1], u[2] - w[2])) > most:
+                return False
+    return True
