@@ -269,3 +269,34 @@ def test_a_scene_tells_which_files_it_refers_to(tmp_path: Path) -> None:
     document["object"]["surface"] = {"file": "surface.json"}
     path.write_text(yaml.safe_dump(document))
     assert scene_files(path) == (path, FOLDER / "use.svg", tmp_path / "surface.json")
+
+
+@pytest.mark.parametrize("target", ["part.svg", "scene.yaml", "again.svg"])
+@pytest.mark.parametrize(
+    ("command", "output"),
+    [
+        ("plan", "output"), ("plan", "figure"), ("plan", "snapshots"), ("describe", "figure"),
+        ("identify", "output"), ("identify", "figure"), ("run", "log"), ("run", "figure"),
+    ],
+)  # fmt: skip
+def test_no_output_takes_the_place_of_what_a_scene_refers_to(
+    tmp_path: Path, command: str, output: str, target: str
+) -> None:
+    """`identify --scene` and `run --scene` did; again.svg is another name of the drawing."""
+    from importlib import import_module
+
+    (tmp_path / "part.svg").write_bytes((FOLDER / "use.svg").read_bytes())
+    (tmp_path / "again.svg").hardlink_to(tmp_path / "part.svg")
+    path = scene(tmp_path, {"file": str(tmp_path / "part.svg")})
+    for name in ("plan.json", "pairs.csv"):
+        (tmp_path / name).write_text("{}")
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    inputs = {
+        "plan": {"scene": path},
+        "describe": {"scene": path},
+        "identify": {"data": [tmp_path / "pairs.csv"], "scene": path},
+        "run": {"plan": tmp_path / "plan.json", "robot": "sim", "scene": path},
+    }[command]
+    with pytest.raises(InputError, match="an input of this command"):
+        import_module(f"flatpush.cli.{command}").command(**inputs, **{output: tmp_path / target})
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before

@@ -41,7 +41,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Fit limit surfaces to DATA and say how well they predict pushes that they have not seen."""
-    from ..documents import check_outputs, save_surface
+    from ..documents import check_outputs, save_surface, scene_files
 
     if model not in MODELS:
         raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
@@ -51,7 +51,7 @@ def command(
         raise InputError("--folds is at least 2", value=folds)
     if length is not None and not 0 < length < float("inf"):
         raise InputError("--length is positive and finite", value=length)
-    check_outputs(data, [output, figure])
+    check_outputs([*data, *(() if scene is None else scene_files(scene))], [output, figure])
     if figure is not None:
         from ..view.figure import check_ending
 

@@ -50,7 +50,7 @@ def command(
     """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C stops the robot."""
     from ..control import ARRIVED
     from ..control.tracking.plan_controller import goal_error
-    from ..documents import check_outputs, load_plan, load_scene
+    from ..documents import check_outputs, load_plan, load_scene, scene_files
     from ..execution import DONE, open_robot, run
     from ..execution.log import check_log
     from ..execution.run import to_controller, way
@@ -61,7 +61,7 @@ def command(
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
     frame = numbers(base_frame, 4, "--base-frame")
-    check_outputs([plan, scene], [log, figure])
+    check_outputs([plan, *(() if scene is None else scene_files(scene))], [log, figure])
     if log is not None:
         check_log(log)
     if figure is not None:
