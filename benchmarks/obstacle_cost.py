@@ -103,11 +103,11 @@ def poses() -> list[tuple[float, float, float]]:
 
 def draw(path: Path, by_obstacles: np.ndarray, by_poses: np.ndarray) -> None:
     """The tables as two drawings with a second scale for memory."""
-    from flatpush.documents.atomic import write_atomically
-    from flatpush.view.canvas import drawing_style, figure_bytes, new_figure
+    import matplotlib
+    from matplotlib.figure import Figure
 
-    with drawing_style():
-        figure = new_figure(8.0, 3.4)
+    with matplotlib.rc_context({"font.size": 9.5, "legend.frameon": False, "svg.hashsalt": "flatpush"}):
+        figure = Figure((8.0, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
         n, pose, edge, _, _, kilobytes = by_obstacles.T
         m, seconds, megabytes = by_poses.T
@@ -132,7 +132,7 @@ def draw(path: Path, by_obstacles: np.ndarray, by_poses: np.ndarray) -> None:
                 axis.set_major_formatter("{x:g}")
                 axis.set_minor_formatter("")
             axes.grid(True, which="major", lw=0.4, color="#dddddd")
-        write_atomically(path, figure_bytes(figure, path.suffix.lower(), "Cost of clearance and of search"))
+        figure.savefig(path, metadata={"Title": "Cost of clearance and of search", "Date": None})
 
 
 def main(figure: Path | None) -> None:

@@ -187,38 +187,46 @@ def run(folder: Path | None = None) -> str:
 def draw(path: Path) -> None:
     """Reference and actual path of the flat point, and the errors over time, for both gains under the perturbed A."""
     from ..documents.atomic import write_atomically
-    from ..view import palette
-    from ..view.canvas import drawing_style, figure_bytes, headline, new_figure
+    from ..view import drawing, legend, palette
+    from ..view.panel import BOTTOM, LEFT, Panel
 
     model = push_model()
     ref = reference(model)
-    with drawing_style():
-        figure = new_figure(width=9.0, height=4.4)
-        headline(
-            figure, "Fig. 4: feedback linearisation under a perturbed table",
-            "flat point on its Dubins path, and distance from the reference; start off by (-1 mm, -2.5 mm, 3.6°)",
-        )  # fmt: skip
-        table, errors = figure.subplots(1, 2)
-        line = np.array([ref.at(t).position for t in np.linspace(0, TIME, 600)])
-        table.plot(*(1000 * line.T), color=palette.START, linewidth=3.0, alpha=0.25, label="reference")
-        for name, gains, colour in (
-            ("paper's gains", Gains(*map(np.array, PAPER_GAINS)), palette.SIMULATED),
-            ("kp = kd = 4", Gains.of(2.0), palette.GOAL),
-        ):
-            controller = TrackingController(model, gains, RATE, reference=ref)
-            runs = closed_loops(
-                controller, [0.0, 1.0], [START + ERROR], matrix(PERTURBED), TIME, friction=TRUE, record=True
-            )
-            assert runs.object is not None
-            z = np.array([model.flat_of(pose)[:2] for pose in runs.object[0]])
-            t = np.arange(len(z)) / RATE
-            off = np.hypot(*(z - np.array([ref.at(k).position for k in t])).T)
-            table.plot(*(1000 * z.T), color=colour, linewidth=1.2, label=name)
-            errors.plot(t, 1000 * off, color=colour, linewidth=1.2, label=name)
-        table.set(xlabel="x [mm]", ylabel="y [mm]")
-        table.set_aspect("equal", adjustable="datalim")
-        table.legend(loc="best", frameon=False)
-        errors.set(xlabel="time [s]", ylabel="distance from the reference [mm]", xlim=(0, TIME))
-        errors.set_ylim(bottom=0)
-        errors.legend(loc="best", frameon=False)
-        write_atomically(path, figure_bytes(figure, path.suffix, "Fig. 4"))
+    title = "Fig. 4: feedback linearisation under a perturbed table"
+    subtitle = "flat point on its Dubins path, and its distance from the reference; start off by (−1 mm, −2.5 mm, 3.6°)"
+    line = 1000 * np.array([ref.at(t).position for t in np.linspace(0, TIME, 600)])
+    looks = {"reference": drawing.Look("#b3b3b3", 3.0)}
+    paths, distances = {"reference": line}, {}
+    for name, gains, colour in (
+        ("paper's gains", Gains(*map(np.array, PAPER_GAINS)), palette.SIMULATED),
+        ("kp = kd = 4", Gains.of(2.0), palette.GOAL),
+    ):
+        controller = TrackingController(model, gains, RATE, reference=ref)
+        runs = closed_loops(
+            controller, [0.0, 1.0], [START + ERROR], matrix(PERTURBED), TIME, friction=TRUE, record=True
+        )
+        assert runs.object is not None
+        z = np.array([model.flat_of(pose)[:2] for pose in runs.object[0]])
+        t = np.arange(len(z)) / RATE
+        off = np.hypot(*(z - np.array([ref.at(k).position for k in t])).T)
+        looks[name] = drawing.Look(colour, 1.3)
+        paths[name], distances[name] = 1000 * z, np.stack([t, 1000 * off], axis=1)
+    entries = [legend.Entry(name, look) for name, look in looks.items()]
+    edge, top, high = legend.EDGE, legend.title_height(title, subtitle), 230.0
+    page = drawing.Drawing(drawing.PAGE, top + high + BOTTOM + legend.LINE + edge, title)
+    legend.draw_title(page, title, subtitle)
+    legend.draw_legend(page, entries, edge, top + high + BOTTOM, page.width)
+    wide = (page.width - 2 * edge) / 2 - LEFT - 6
+    every = np.concatenate(list(paths.values()))
+    low, up = every.min(axis=0) - 3, every.max(axis=0) + 3
+    table = Panel(page, (edge + LEFT, top, edge + LEFT + wide, top + high), (*low.tolist(), *up.tolist()))
+    most = 1.05 * max(float(rows[:, 1].max()) for rows in distances.values())
+    frame = (page.width - edge - wide, top, page.width - edge, top + high)
+    errors = Panel(page, frame, (0.0, 0.0, TIME, most), equal=False)
+    table.axes()
+    errors.axes("time [s]", "distance from the reference [mm]")
+    for name, look in looks.items():
+        table.line(paths[name], look)
+        if name in distances:
+            errors.line(distances[name], look)
+    write_atomically(path, page.encode(path.suffix))

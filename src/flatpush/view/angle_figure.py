@@ -5,13 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from ..documents.atomic import write_atomically
-from ..friction.cross_validation import interval
+from ..friction.cross_validation import Judgement, interval
+from ..geometry.pose import Array
+from . import drawing as d
 from . import palette
 from .angle_table import Judged
-from .canvas import SOFT, drawing_style, figure_bytes, headline, legend_below, new_figure
+from .drawing import MARKS, PAGE, SOFT, Drawing, Look
 from .figure import check_ending
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import BOTTOM
+from .rows import names_width, row_axes
 
 ENDINGS = (".svg", ".png")
+ROW = 38.0  # height of a row [pt]
 COLOURS = (
     palette.PUSHES[1],
     palette.GOAL,
@@ -20,7 +26,6 @@ COLOURS = (
     palette.PUSHER,
     palette.PUSHES[4],
 )
-MARKS = "osD^vP"
 
 
 def angle_figure(judged: Judged, path: str | Path, *, title: str, subtitle: str = "") -> None:
@@ -30,47 +35,40 @@ def angle_figure(judged: Judged, path: str | Path, *, title: str, subtitle: str 
         InputError: if the ending is another, or the file cannot be written.
     """
     ending = check_ending(path, ENDINGS)
+    write_atomically(path, draw_angles(judged, title, subtitle).encode(ending))
+
+
+def draw_angles(judged: Judged, title: str, subtitle: str = "") -> Drawing:
+    """The same as a drawing."""
     models = list(dict.fromkeys(model for row in judged.values() for model in row))
     rows = {name: {m: [j] for m, j in row.items()} for name, row in judged.items()}
     if len(judged) > 1:
         rows["all, equally"] = {m: [row[m] for row in judged.values() if m in row] for m in models}
-    with drawing_style():
-        from matplotlib.lines import Line2D
+    looks = dict(zip(models, zip(COLOURS, MARKS, strict=True), strict=False))
+    entries = [Entry(m, Look(looks[m][0], 1.4), "line and dot", mark=looks[m][1]) for m in models]
+    ranges = {(name, m): _range(found) for name, row in rows.items() for m, found in row.items()}
+    top = title_height(title, subtitle) + 4
+    left, bottom = EDGE + names_width(list(rows)), top + ROW * len(rows)
+    page = Drawing(PAGE, bottom + BOTTOM + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, bottom + BOTTOM, PAGE - 2 * EDGE)
+    most = 1.06 * max(float(values.max()) for values in ranges.values())
+    label = "angle between predicted and measured twist [°]: mean with 95 % interval, | median"
+    panel = row_axes(page, (left, top, PAGE - EDGE, bottom), list(rows), most, label)
+    if len(judged) > 1:
+        panel.line(np.array([[0.0, 1.5 - len(rows)], [most, 1.5 - len(rows)]]), Look(SOFT, 0.7), 1)
+    for place, (name, row) in enumerate(rows.items()):
+        for k, model in enumerate(m for m in models if m in row):
+            y = -place - 0.18 * (k - (len(row) - 1) / 2)
+            colour, kind = looks[model]
+            low, high, mean, median = ranges[name, model].tolist()
+            panel.line(np.array([[low, y], [high, y]]), Look(colour, 1.4), 3)
+            panel.line(np.array([[median, y - 0.08], [median, y + 0.08]]), Look(colour, 1.6), 4)
+            page.add(d.mark(kind, panel.at(np.array([mean, y])), 2.6, Look("#ffffff", 0.5, fill=colour)), 5)
+    return page
 
-        figure = new_figure(width=8.4, height=1.7 + 0.55 * len(rows))
-        headline(figure, title, subtitle)
-        looks = dict(zip(models, zip(COLOURS, MARKS, strict=True), strict=False))
-        entries = []
-        for model in models:
-            colour, mark = looks[model]
-            entries.append(
-                Line2D([], [], color=colour, marker=mark, linewidth=1.4, markersize=5, label=model)
-            )
-        legend_below(figure, entries)
-        axes = figure.add_subplot()
-        for place, row in enumerate(rows.values()):
-            for k, model in enumerate(m for m in models if m in row):
-                y = place + 0.14 * (k - (len(row) - 1) / 2)
-                colour, mark = looks[model]
-                low, high = np.degrees(interval(row[model], np.mean))
-                mean = np.degrees(np.mean([j.mean for j in row[model]]))
-                median = np.degrees(np.mean([j.median for j in row[model]]))
-                axes.plot([low, high], [y, y], color=colour, linewidth=1.4, solid_capstyle="butt")
-                axes.plot(mean, y, mark, color=colour, markersize=5, mec="white", mew=0.5)
-                axes.plot(median, y, "|", color=colour, markersize=6, mew=1.6)
-        axes.set_yticks(range(len(rows)), list(rows))
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_xlim(left=0)
-        axes.set_xlabel("angle between predicted and measured twist [°]: mean with 95 % interval, | median")
-        axes.grid(True, axis="x", color="#ececec", linewidth=0.6)
-        for edge in range(1, len(rows)):
-            axes.axhline(
-                edge - 0.5,
-                color="#dddddd" if edge < len(rows) - 1 or len(judged) == 1 else SOFT,
-                linewidth=0.6,
-            )
-        axes.tick_params(axis="y", length=0)
-        axes.set_axisbelow(True)
-        for side in ("top", "right", "left"):
-            axes.spines[side].set_visible(False)
-        write_atomically(path, figure_bytes(figure, ending, title))
+
+def _range(found: list[Judgement]) -> Array:
+    """Low and high end of the interval, mean and median [°]."""
+    means, medians = (np.mean([getattr(j, what) for j in found]) for what in ("mean", "median"))
+    return np.degrees([*interval(found, np.mean), means, medians])

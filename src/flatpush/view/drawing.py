@@ -130,6 +130,31 @@ class Drawing:
         return png_bytes(self)
 
 
+MARKS = "osD^vP"  # kinds of marks, as they are tried in turn: disc, square, diamond, triangles, cross
+
+
+def mark(kind: str, middle: Array, radius: float, look: Look) -> Line | Disc:
+    """A mark of a kind with its middle, shape (2,), and about that radius [pt]."""
+    if kind == "o":
+        return Disc(middle, radius, look)
+    if kind == "P":
+        arm, half = 1.1 * radius, 0.4 * radius
+        corners = [(half, arm), (half, half), (arm, half)]
+        turns = (np.array([[0, -1], [1, 0]]) for _ in range(4))
+        quarter, points = np.array(corners), []
+        for turn in turns:
+            points.append(quarter)
+            quarter = quarter @ turn
+        return Line(middle + np.concatenate(points), look, closed=True)
+    count, start, size = {"s": (4, 0.25, 1.25), "D": (4, 0.0, 1.3), "^": (3, -0.5, 1.3), "v": (3, 0.5, 1.3)}[
+        kind
+    ]
+    angles = np.pi * (start + 2 * np.arange(count) / count)
+    return Line(
+        middle + size * radius * np.stack([np.cos(angles), np.sin(angles)], axis=1), look, closed=True
+    )
+
+
 def arc_points(centre: Array, radius: float, start: float, end: float) -> Array:
     """Points on a circular arc between two angles [rad], one each 5°; shape (n, 2)."""
     n = 2 + int(abs(end - start) / np.radians(5.0))

@@ -19,12 +19,16 @@ EDGE = 8.0  # border of the page [pt]
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the legend: a symbol and what it stands for; with signs it is two dots, one with + and one with −."""
+    """A line of the legend: a symbol and what it stands for; with signs it is two dots, one with + and one with −.
+
+    mark: the kind of a dot, as d.mark has it.
+    """
 
     label: str
     look: Look
     symbol: Literal["line", "box", "dot", "line and dot"] = "line"
     signs: bool = False
+    mark: str = "o"
 
     @property
     def width(self) -> float:
@@ -102,7 +106,7 @@ def _draw_symbol(page: Drawing, entry: Entry, x: float, y: float) -> None:
         around = Look(look.stroke, 0.9, fill=look.fill or look.stroke)
         for sign, shift in (("+", -5.0), ("−", 5.0)) if entry.signs else (("", 0.0),):
             centre = middle + np.array([shift, 0.0])
-            page.add(d.Disc(centre, 3.4, around), 20)
+            page.add(d.mark(entry.mark, centre, 3.4, around), 20)
             arms = {"+": ((1.7, 0.0), (0.0, 1.7)), "−": ((1.7, 0.0),), "": ()}[sign]
             for arm in arms:
                 page.add(d.Line(np.stack([centre - arm, centre + arm]), Look(look.stroke, 0.9)), 20)

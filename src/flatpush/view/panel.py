@@ -115,8 +115,14 @@ class Panel:
             d.Text(float(x), float(y) + 0.36 * size, text, size, colour, anchor, bold, halo), z, self.frame
         )
 
-    def axes(self, x: str = "x [mm]", y: str = "y [mm]", numbers: tuple[bool, bool] = (True, True)) -> None:
-        """The grid, its numbers, and what they are; an empty name leaves it out."""
+    def axes(
+        self,
+        x: str = "x [mm]",
+        y: str = "y [mm]",
+        numbers: tuple[bool, bool] = (True, True),
+        rows: bool = False,
+    ) -> None:
+        """The grid, its numbers, and what they are; an empty name leaves it out; rows: only lines upwards."""
         left, top, right, bottom = self.frame
         line = Look(GRID, 0.6)
         for value in ticks(self.box[0], self.box[2], max((right - left) / 48, 4.5)):
@@ -124,7 +130,7 @@ class Panel:
             self.page.add(d.Line(np.array([[place, top], [place, bottom]]), line), -2)
             if numbers[0]:
                 self.page.add(d.Text(place, bottom + 10, number(value), NUMBERS, SOFT, "middle"), -1)
-        for value in ticks(self.box[1], self.box[3], max((bottom - top) / 26, 4.5)):
+        for value in () if rows else ticks(self.box[1], self.box[3], max((bottom - top) / 26, 4.5)):
             place = float(self.at(np.array([0.0, value]))[1])
             self.page.add(d.Line(np.array([[left, place], [right, place]]), line), -2)
             if numbers[1]:

@@ -8,12 +8,21 @@ import numpy as np
 
 from ..documents.atomic import write_atomically
 from ..geometry.pose import Array
+from . import drawing as d
 from . import palette
-from .canvas import INK, SOFT, drawing_style, figure_bytes, headline, legend_below, new_figure
+from .drawing import INK, MARKS, PAGE, Drawing, Look
 from .figure import check_ending
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import BOTTOM
+from .rows import names_width, row_axes
 
 ENDINGS = (".svg", ".png")
-MARKS = "osD^vP"
+ROW = 36.0  # height of a row [pt]
+COLUMNS = (
+    ("distance at the end [mm]", 1000.0),
+    ("angle at the end [°]", float(np.degrees(1.0))),
+    ("mean over the run [mm]", 1000.0),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +41,6 @@ class ReplayRow:
     errors: Array
 
 
-COLUMNS = (
-    ("distance at the end [mm]", 1000.0),
-    ("angle at the end [°]", float(np.degrees(1.0))),
-    ("mean over the run [mm]", 1000.0),
-)
-
-
 def replay_figure(
     rows: Sequence[ReplayRow], looks: Sequence[str], path: str | Path, *, title: str, subtitle: str = ""
 ) -> None:
@@ -51,39 +53,34 @@ def replay_figure(
         InputError: if the ending is another, or the file cannot be written.
     """
     ending = check_ending(path, ENDINGS)
-    with drawing_style():
-        from matplotlib.lines import Line2D
+    write_atomically(path, draw_replay(rows, looks, title, subtitle).encode(ending))
 
-        figure = new_figure(width=10.0, height=1.6 + 0.48 * len(rows))
-        headline(figure, title, subtitle)
-        entries = [
-            Line2D([], [], color=palette.push_colour(k), marker=MARKS[k], ls="", ms=5, label=name)
-            for k, name in enumerate(looks)
-        ]
-        legend_below(
-            figure, [*entries, Line2D([], [], color=INK, marker="|", ms=11, mew=1.8, ls="", label="mean")]
-        )
-        panels = figure.subplots(1, len(COLUMNS), sharey=True)
-        for axes, (label, scale), values in zip(panels, COLUMNS, range(len(COLUMNS)), strict=True):
-            for place, row in enumerate(rows):
-                found = scale * row.errors[:, values]
-                for k, name in enumerate(looks):
-                    some = found[np.array(row.names) == name]
-                    height = place + 0.13 * (k - (len(looks) - 1) / 2)
-                    axes.plot(
-                        some, np.full(len(some), height), MARKS[k], color=palette.push_colour(k), ms=3.6,
-                        mec="white", mew=0.3, alpha=0.9, clip_on=False,
-                    )  # fmt: skip
-                axes.plot(np.mean(found), place, "|", color=INK, ms=20, mew=1.6, zorder=4)
-            axes.set_xlim(left=0)
-            axes.set_xlabel(label)
-            axes.grid(True, axis="x", color="#ececec", linewidth=0.6)
-            axes.set_axisbelow(True)
-            axes.tick_params(axis="y", length=0)
-            for edge in range(1, len(rows)):
-                axes.axhline(edge - 0.5, color="#dddddd", linewidth=0.6)
-            for side in ("top", "right", "left"):
-                axes.spines[side].set_visible(False)
-        panels[0].set_yticks(range(len(rows)), [row.label for row in rows], color=SOFT)
-        panels[0].set_ylim(len(rows) - 0.5, -0.5)
-        write_atomically(path, figure_bytes(figure, ending, title))
+
+def draw_replay(rows: Sequence[ReplayRow], looks: Sequence[str], title: str, subtitle: str = "") -> Drawing:
+    """The same as a drawing."""
+    dots = [Look("#ffffff", 0.4, fill=palette.push_colour(k), fill_opacity=0.9) for k in range(len(looks))]
+    entries = [
+        Entry(name, Look(palette.push_colour(k)), "dot", mark=MARKS[k]) for k, name in enumerate(looks)
+    ]
+    entries.append(Entry("mean", Look(INK, 1.8)))
+    top, names = title_height(title, subtitle) + 6, [row.label for row in rows]
+    left = EDGE + names_width(names)
+    wide = (PAGE - EDGE - left + 14) / len(COLUMNS)
+    bottom = top + ROW * len(rows)
+    page = Drawing(PAGE, bottom + BOTTOM + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, bottom + BOTTOM, PAGE - 2 * EDGE)
+    for column, (label, scale) in enumerate(COLUMNS):
+        known = np.concatenate([row.errors[:, column] for row in rows])
+        most = 1.06 * scale * max(float(np.nanmax(known)), 1e-9)
+        x = left + wide * column
+        panel = row_axes(page, (x, top, x + wide - 14, bottom), names, most, label, named=column == 0)
+        for place, row in enumerate(rows):
+            found = scale * row.errors[:, column]
+            for k, name in enumerate(looks):
+                height = -place - 0.13 * (k - (len(looks) - 1) / 2)
+                for value in found[(np.array(row.names) == name) & np.isfinite(found)]:
+                    page.add(d.mark(MARKS[k], panel.at(np.array([value, height])), 2.0, dots[k]), 3)
+            mean = float(np.mean(found))
+            panel.line(np.array([[mean, -place - 0.3], [mean, -place + 0.3]]), Look(INK, 1.6), 4)
+    return page

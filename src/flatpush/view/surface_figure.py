@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,19 +10,30 @@ from ..friction.pairs import Pairs
 from ..friction.report import twist_angles
 from ..friction.surface import LimitSurface
 from ..geometry.pose import Array
+from . import drawing as d
 from . import palette
-from .canvas import INK, SOFT, drawing_style, figure_bytes, headline, legend_below, new_figure
+from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .figure import check_ending
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from mpl_toolkits.mplot3d import Axes3D
+from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .panel import BOTTOM, LEFT, Panel, number, ticks
 
 ENDINGS = (".svg", ".png")
 COLOURS = {"ellipsoid": palette.PUSHES[1], "quartic": palette.GOAL, "loads": palette.PUSHES[0]}
-_NEAR = np.sin(np.radians(20.0))  # data this close to a plane stand beside its section
-_COARSE, _FINE = (15, 24), 121
+# Of angles from 0 to WORST: after the map viridis of S. van der Walt and N. Smith, from light to dark.
+SHADES = ("#fde725", "#90d743", "#35b779", "#21918c", "#31688e", "#443983", "#440154")
+WORST = 30.0  # [°]
+NEAR = np.sin(np.radians(20.0))  # data this close to a plane stand beside its section
+COARSE, FINE = (15, 25), 121
+VIEW = np.radians(22.0), np.radians(-55.0)  # from which the surface is seen: elevation, azimuth
+SKIN = Look("#5d86b3", 0.3, opacity=0.7, fill="#9fc2e8", fill_opacity=0.24)
+NAMES = ("force along x [N]", "force along y [N]", "torque / ℓ [N]")
+SHORT = ("fx [N]", "fy [N]", "τ / ℓ [N]")
+PLANES = {(0, 1): "without torque", (0, 2): "without force along y", (1, 2): "without force along x"}
+LABELS = {
+    "ellipsoid": "ellipsoid",
+    "quartic": "convex quartic",
+    "loads": "Coulomb friction at known places, fitted loads",
+}
 
 
 def surface_figure(
@@ -50,21 +60,35 @@ def surface_figure(
         InputError: if the ending is another, or the file cannot be written.
     """
     ending = check_ending(path, ENDINGS)
-    with drawing_style():
-        figure = new_figure(width=9.6, height=8.4)
-        headline(figure, title or "limit surfaces from data", subtitle)
-        grid = figure.add_gridspec(2, 2)
-        _legend(figure, surfaces)
-        space = figure.add_subplot(grid[0, 0], projection="3d")
-        _draw_space(space, *next(iter(surfaces.values())), pairs, length)
-        reach = _reach(surfaces, pairs, length)
-        for cell, (i, j) in zip((grid[0, 1], grid[1, 0], grid[1, 1]), ((0, 1), (0, 2), (1, 2)), strict=True):
-            _draw_section(figure.add_subplot(cell), surfaces, pairs, length, i, j, reach)
-        write_atomically(path, figure_bytes(figure, ending, title or "limit surfaces from data"))
+    drawn = draw_surfaces(surfaces, pairs, length, title or "limit surfaces from data", subtitle)
+    write_atomically(path, drawn.encode(ending))
 
 
-_NAMES = ("force along x [N]", "force along y [N]", "torque / ℓ [N]")
-_PLANES = {(0, 1): "without torque", (0, 2): "without force along y", (1, 2): "without force along x"}
+def draw_surfaces(
+    surfaces: Mapping[str, tuple[LimitSurface, float]], pairs: Pairs, length: float, title: str, subtitle: str
+) -> Drawing:
+    """The same as a drawing."""
+    entries = _legend(surfaces)
+    top, side = title_height(title, subtitle) + 16, (PAGE - 2 * EDGE) / 2 - LEFT - 8
+    rows = [top, top + side + BOTTOM + 22]
+    below = rows[1] + side + BOTTOM
+    page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
+    draw_title(page, title, subtitle)
+    draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
+    columns = [EDGE + LEFT, EDGE + 2 * LEFT + side + 16]
+    reach = _reach(surfaces, pairs, length)
+    _draw_space(
+        page,
+        (columns[0], rows[0], columns[0] + side, rows[0] + side),
+        *next(iter(surfaces.values())),
+        pairs,
+        length,
+    )
+    for (column, row), (i, j) in zip(((1, 0), (0, 1), (1, 1)), PLANES, strict=True):
+        x, y = columns[column], rows[row]
+        panel = Panel(page, (x, y, x + side, y + side), (-reach, -reach, reach, reach))
+        _draw_section(panel, surfaces, pairs, length, i, j, reach)
+    return page
 
 
 def _boundary(surface: LimitSurface, size: float, directions: Array, length: float) -> Array:
@@ -91,47 +115,80 @@ def _reach(surfaces: Mapping[str, tuple[LimitSurface, float]], pairs: Pairs, len
     return 1.4 * max(float(np.percentile(np.abs(F), 97)), *map(float, sizes))
 
 
-def _draw_space(axes: "Axes3D", surface: LimitSurface, size: float, pairs: Pairs, length: float) -> None:
-    from matplotlib.ticker import MaxNLocator
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-    lat, lon = np.linspace(-np.pi / 2, np.pi / 2, _COARSE[0]), np.linspace(-np.pi, np.pi, _COARSE[1])
+def _draw_space(
+    page: Drawing, frame: Box, surface: LimitSurface, size: float, pairs: Pairs, length: float
+) -> None:
+    """The surface as seen from VIEW, its faces and the data from the back to the front, and the axes through it."""
+    lat, lon = np.linspace(-np.pi / 2, np.pi / 2, COARSE[0]), np.linspace(-np.pi, np.pi, COARSE[1])
     B, L = np.meshgrid(lat, lon, indexing="ij")
-    d = np.stack([np.cos(B) * np.cos(L), np.cos(B) * np.sin(L), np.sin(B)], axis=-1)
-    P = _boundary(surface, size, d.reshape(-1, 3), length).reshape(d.shape)
-    axes.plot_surface(
-        *np.moveaxis(P, -1, 0),
-        rstride=1,
-        cstride=1,
-        color="#9fc2e8",
-        alpha=0.28,
-        linewidth=0.25,
-        edgecolor="#5d86b3",
-    )
+    unit = np.stack([np.cos(B) * np.cos(L), np.cos(B) * np.sin(L), np.sin(B)], axis=-1)
+    P = _boundary(surface, size, unit.reshape(-1, 3), length).reshape(unit.shape)
     F, V = _data(pairs, length)
+    limit = 1.08 * max(float(np.max(np.abs(P))), float(np.percentile(np.abs(F), 97)))
+    panel = Panel(page, frame, (-1.25 * limit, -1.25 * limit, 1.25 * limit, 1.25 * limit))
+    page.add(d.Text(frame[0], frame[1] - 5, "the first surface in space", 8.0, SOFT, bold=True), 20)
+    for axis in range(3):
+        ends = limit * np.eye(3)[axis] * np.array([[-1.0], [1.0]])
+        panel.line(_seen(ends), Look("#999999", 0.7), 1)
+        for value in ticks(-limit, limit, 4):
+            if value and abs(value) < 0.8 * limit:
+                at = _seen(value * np.eye(3)[axis])
+                panel.disc(at, 0.9, Look(fill="#999999"), 1)
+                panel.text(at + panel.unit(1.0) * np.array([0.0, -7.0]), number(value), SOFT, 6.5, z=1.5)
+        panel.text(_seen(1.15 * ends[1]), SHORT[axis], SOFT, 8.0)
+    quads = np.stack([P[:-1, :-1], P[1:, :-1], P[1:, 1:], P[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+    for quad in quads[np.argsort(_depth(quads.mean(axis=1)))]:
+        panel.area(_seen(quad), SKIN, 3)
     angles = np.degrees(twist_angles(surface.twist(pairs.wrenches), pairs.twists, length))
-    dots = axes.scatter(*F.T, c=angles, cmap="viridis_r", vmin=0, vmax=30, s=16, depthshade=False, zorder=5)
-    reach = float(np.max(np.abs(P)))
-    lines = Line3DCollection(np.stack([F, F + 0.3 * reach * V], axis=1), colors=INK, linewidths=0.7, zorder=6)
-    axes.add_collection3d(lines)
-    axes.set(xlabel="fx [N]", ylabel="fy [N]", zlabel="τ / ℓ [N]")
-    axes.set_box_aspect((1, 1, 1), zoom=1.1)
-    limit = max(reach, float(np.percentile(np.abs(F), 97))) * 1.08
-    axes.set(xlim=(-limit, limit), ylim=(-limit, limit), zlim=(-limit, limit))
-    axes.view_init(elev=22, azim=-55)
-    axes.tick_params(pad=-1, labelsize=7.5)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_pane_color((1, 1, 1, 0))
-        axis.labelpad = -4
-        axis.set_major_locator(MaxNLocator(4))
-    bar = axes.figure.colorbar(dots, ax=axes, shrink=0.62, pad=0.0, extend="max", location="left")
-    bar.set_label("twist predicted off by [°]", fontsize=8.5)
-    bar.ax.tick_params(labelsize=7.5)
-    bar.outline.set_linewidth(0.4)
+    for k in np.argsort(_depth(F)):
+        panel.line(_seen(np.stack([F[k], F[k] + 0.3 * limit * V[k]])), Look(INK, 0.7), 5)
+        panel.disc(_seen(F[k]), 2.2, Look("#ffffff", 0.3, fill=_shade(float(angles[k]))), 6)
+    _bar(page, frame)
+
+
+def _bar(page: Drawing, frame: Box) -> None:
+    """What the colours of the data mean."""
+    left, bottom, wide = frame[0] + 4, frame[3] - 4, 90.0
+    for k in range(30):
+        x = left + wide * k / 30
+        corners = np.array(
+            [(x, bottom - 6), (x + wide / 30, bottom - 6), (x + wide / 30, bottom), (x, bottom)]
+        )
+        page.add(d.Line(corners, Look(fill=_shade(k)), closed=True), 5)
+    for value in (0, 10, 20, 30):
+        text = f"{value}°" if value < WORST else f"{value}° or more"
+        anchor: d.Anchor = "middle" if value < WORST else "start"
+        page.add(
+            d.Text(left + wide * value / WORST - (value == WORST) * 6, bottom + 8, text, 6.5, SOFT, anchor),
+            20,
+        )
+    page.add(d.Text(left, bottom - 10, "twist predicted off by", 7.0, SOFT), 20)
+
+
+def _shade(angle: float) -> str:
+    """The colour of an angle [°]."""
+    place = min(angle / WORST, 1.0) * (len(SHADES) - 1)
+    k = min(int(place), len(SHADES) - 2)
+    low, high = (np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in SHADES[k : k + 2])
+    return "#" + "".join(f"{round(v):02x}" for v in low + (place - k) * (high - low))
+
+
+def _seen(points: Array) -> Array:
+    """Where points (..., 3) are seen from VIEW, far away: (..., 2), to the right and up."""
+    up, around = VIEW
+    right = np.array([-np.sin(around), np.cos(around), 0.0])
+    above = np.array([-np.sin(up) * np.cos(around), -np.sin(up) * np.sin(around), np.cos(up)])
+    return points @ np.stack([right, above], axis=1)
+
+
+def _depth(points: Array) -> Array:
+    """How near points (n, 3) are to the eye."""
+    up, around = VIEW
+    return points @ np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
 
 
 def _draw_section(
-    axes: "Axes",
+    panel: Panel,
     surfaces: Mapping[str, tuple[LimitSurface, float]],
     pairs: Pairs,
     length: float,
@@ -140,53 +197,26 @@ def _draw_section(
     reach: float,
 ) -> None:
     """The curve of H = 1 in a coordinate plane, and the data near it with their twists."""
-    k = 3 - i - j
-    t = np.linspace(0, 2 * np.pi, _FINE)
-    d = np.zeros((_FINE, 3))
-    d[:, i], d[:, j] = np.cos(t), np.sin(t)
+    panel.axes(NAMES[i], NAMES[j])
+    head = f"section {PLANES[i, j]}"
+    panel.page.add(d.Text(panel.frame[0], panel.frame[1] - 5, head, 8.0, SOFT, bold=True), 20)
+    t = np.linspace(0, 2 * np.pi, FINE)
+    directions = np.zeros((FINE, 3))
+    directions[:, i], directions[:, j] = np.cos(t), np.sin(t)
     for name, (surface, size) in surfaces.items():
-        P = _boundary(surface, size, d, length)
-        axes.plot(P[:, i], P[:, j], color=COLOURS.get(name, INK), linewidth=1.6, zorder=3)
+        P = _boundary(surface, size, directions, length)
+        panel.line(P[:, [i, j]], Look(COLOURS.get(name, INK), 1.6), 3)
     F, V = _data(pairs, length)
-    near = np.abs(F[:, k]) <= _NEAR * np.linalg.norm(F, axis=1)
-    axes.quiver(
-        F[near, i], F[near, j], V[near, i], V[near, j],
-        angles="xy", scale_units="xy", scale=1 / (0.22 * reach), color=SOFT, width=0.0045, headwidth=4, zorder=5,
-    )  # fmt: skip
-    axes.plot(F[near, i], F[near, j], "o", color=INK, markersize=3.4, mec="white", mew=0.4, zorder=6)
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel=_NAMES[i], ylabel=_NAMES[j])
-    axes.set_title(f"section {_PLANES[i, j]}", loc="left", color=SOFT)
-    axes.set_aspect("equal", adjustable="box")
-    axes.grid(True, color="#ececec", linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    near = np.abs(F[:, 3 - i - j]) <= NEAR * np.linalg.norm(F, axis=1)
+    for force, twist in zip(F[near][:, [i, j]], V[near][:, [i, j]], strict=True):
+        panel.arrow(force, force + 0.22 * reach * twist, SOFT, 0.9, 5)
+        panel.disc(force, 2.2, Look("#ffffff", 0.4, fill=INK), 6)
 
 
-def _legend(figure: "Figure", surfaces: Mapping[str, tuple[LimitSurface, float]]) -> None:
-    from matplotlib.lines import Line2D
-
-    entries = [
-        Line2D([], [], color=COLOURS.get(name, INK), linewidth=1.8, label=_LABELS.get(name, name))
-        for name in surfaces
+def _legend(surfaces: Mapping[str, tuple[LimitSurface, float]]) -> list[Entry]:
+    entries = [Entry(LABELS.get(name, name), Look(COLOURS.get(name, INK), 1.8)) for name in surfaces]
+    return [
+        *entries,
+        Entry("measured wrench (sections: within 20°)", Look(INK), "dot"),
+        Entry("direction of its twist", Look(SOFT, 0.9)),
     ]
-    entries += [
-        Line2D(
-            [],
-            [],
-            linestyle="",
-            marker="o",
-            color=INK,
-            markersize=4,
-            label="measured wrench (sections: within 20°)",
-        ),
-        Line2D([], [], color=SOFT, linewidth=0.9, label="direction of its twist"),
-    ]
-    legend_below(figure, entries)
-
-
-_LABELS = {
-    "ellipsoid": "ellipsoid",
-    "quartic": "convex quartic",
-    "loads": "Coulomb friction at known places, fitted loads",
-}
