@@ -16,6 +16,7 @@ GROUP = "flatpush.robots"
 BUILT_IN = {
     "sim": "flatpush.execution.simulated:sim",
     "dry-run": "flatpush.execution.simulated:dry_run",
+    "egm": "flatpush.execution.egm:egm",
     "mujoco": "flatpush.execution.cell.robot:mujoco",
 }
 

@@ -1,0 +1,151 @@
+"""A simulated robot controller that speaks Externally Guided Motion: a process of its own, started by tests.
+
+It counts cycles of 4 ms; a cycle ends when its message was answered, or after a while without. After 25 cycles in a
+row without an answer it stops the arm, as a controller's communication time-out does. In a line for each request on
+standard input it says what it saw; its arm is a lag of first order, or the tool of the physics cell.
+"""
+
+import argparse
+import json
+import math
+import select
+import socket
+import sys
+
+import numpy as np
+from abb_robot_client._egm_protobuf import egm_pb2
+
+PERIOD, MISSED = 0.004, 25
+LAG = 0.02  # [s]
+
+
+class Ideal:
+    """A tool that follows with a lag."""
+
+    def __init__(self, home):
+        self.pose, self.wanted = np.array(home, dtype=float), np.array(home, dtype=float)
+
+    def step(self, target, twist):
+        if target is not None:
+            self.wanted = target + LAG * twist
+        self.pose = self.pose + (1 - math.exp(-PERIOD / LAG)) * (self.wanted - self.pose)
+
+    def halt(self):
+        self.wanted = self.pose.copy()
+
+    object = None
+
+
+class Cell:
+    """The tool and the object of a plan in MuJoCo."""
+
+    def __init__(self, plan, start):
+        import flatpush as fp
+        from flatpush.execution.cell.robot import CellRobot
+        from flatpush.execution.simulated import Unknown
+
+        self.robot = CellRobot(fp.load_plan(plan), Unknown(start=start)).__enter__()
+
+    @property
+    def pose(self):
+        return self.robot.state().pose
+
+    @property
+    def object(self):
+        return [float(v) for v in self.robot.object]
+
+    def step(self, target, twist):
+        from flatpush.execution import Target
+
+        now = self.robot.clock.now()
+        if target is not None:
+            self.robot.send(Target(now + PERIOD, target, twist))
+        self.robot.clock.wait(now + PERIOD)
+
+    def halt(self):
+        self.robot.stop()
+
+
+def message(cycle, pose, alive):
+    told = egm_pb2.EgmRobot()
+    told.header.seqno, told.header.tm = cycle, round(1000 * PERIOD * cycle)
+    told.header.mtype = egm_pb2.EgmHeader.MessageType.Value("MSGTYPE_DATA")
+    place, turn = told.feedBack.cartesian.pos, told.feedBack.cartesian.orient
+    place.x, place.y, place.z = (1000 * v for v in pose[:3])
+    turn.u0, turn.u1, turn.u2, turn.u3 = 0.0, math.cos(pose[3] / 2), math.sin(pose[3] / 2), 0.0
+    told.motorState.state = told.motorState.MOTORS_ON
+    told.rapidExecState.state = (
+        told.rapidExecState.RAPID_RUNNING if alive else told.rapidExecState.RAPID_STOPPED
+    )
+    return told.SerializeToString()
+
+
+def wish(data, yaw):
+    told = egm_pb2.EgmSensor()
+    told.ParseFromString(data)
+    place, turn = told.planned.cartesian.pos, told.planned.cartesian.orient
+    angle = 2 * math.atan2(turn.u2, turn.u1)
+    angle = yaw + math.remainder(angle - yaw, 2 * math.pi)
+    speed = list(told.speedRef.cartesians.value)
+    twist = np.array([speed[0] / 1000, speed[1] / 1000, speed[2] / 1000, math.radians(speed[5])])
+    return np.array([place.x / 1000, place.y / 1000, place.z / 1000, angle]), twist
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--port", type=int, required=True)
+    parser.add_argument("--home", type=float, nargs=4, default=[0.0, 0.0, 0.03, 0.5])
+    parser.add_argument("--plan")
+    parser.add_argument("--start", type=float, nargs=3, default=[0.0, 0.0, 0.0])
+    parser.add_argument("--patience", type=float, default=2.0, help="with an answer [s]")
+    parser.add_argument("--cycles", type=int, default=10**9)
+    parser.add_argument(
+        "--freeze", type=int, default=-1, help="says nothing any more from this answered cycle on"
+    )
+    asked = parser.parse_args()
+    arm = Cell(asked.plan, asked.start) if asked.plan else Ideal(asked.home)
+    line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    line.bind(("127.0.0.1", 0))
+    print(json.dumps({"port": line.getsockname()[1]}), flush=True)
+    answered = missed = worst = 0
+    connected, stopped, after, farthest, last = False, -1, None, 0.0, arm.pose
+    for cycle in range(asked.cycles):
+        if select.select([sys.stdin], [], [], 0)[0]:
+            if not sys.stdin.readline():
+                break
+            told = {
+                "cycles": cycle,
+                "answered": answered,
+                "worst": worst,
+                "stopped": stopped,
+                "farthest": farthest,
+            }
+            told |= {"pose": [float(v) for v in arm.pose], "object": arm.object}
+            print(json.dumps(told), flush=True)
+        if 0 <= asked.freeze <= answered:
+            select.select([sys.stdin], [], [], 0.05)
+            continue
+        line.sendto(message(cycle, arm.pose, stopped < 0), ("127.0.0.1", asked.port))
+        # Before anybody has answered it only calls.
+        came = select.select([line], [], [], asked.patience if connected and stopped < 0 else 0.02)[0]
+        target = twist = None
+        if came:
+            target, twist = wish(line.recv(65536), float(arm.pose[3]))
+            while select.select([line], [], [], 0)[0]:
+                target, twist = wish(line.recv(65536), float(arm.pose[3]))
+            answered, missed, connected = answered + 1, 0, True
+        elif connected:
+            missed += 1
+            worst = max(worst, missed)
+            if missed == MISSED and stopped < 0:
+                stopped, after = cycle, arm.pose.copy()
+                arm.halt()
+        arm.step(None if stopped >= 0 else target, twist)
+        if after is not None:
+            farthest = max(farthest, float(np.linalg.norm((arm.pose - after)[:3])))
+        last = arm.pose
+    return last
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,233 @@
+"""Externally Guided Motion over loopback: a simulated controller in a process of its own, judged by its cycles."""
+
+import json
+import math
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.execution import DONE, RobotFault, Target, open_robot, run
+from flatpush.execution.course import Course
+from flatpush.execution.run import Played, stream
+from flatpush.testing import check_robot
+
+pytest.importorskip("abb_robot_client")
+from flatpush.execution.egm import EgmRobot
+
+SCRIPT = Path(__file__).parents[1] / "egm_controller.py"
+HOME = (-0.1, 0.02, 0.03, 0.5)
+SILENCE = 20.0  # on a shared machine: what is asserted are cycles
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        line.bind(("127.0.0.1", 0))
+        return line.getsockname()[1]
+
+
+class Controller:
+    """The process."""
+
+    def __init__(self, *options, port=None):
+        self.port = port or free_port()
+        words = [
+            sys.executable,
+            str(SCRIPT),
+            "--port",
+            str(self.port),
+            "--home",
+            *map(str, HOME),
+            *map(str, options),
+        ]
+        self.process = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=dict(os.environ)
+        )
+        self.process.stdout.readline()
+
+    def asked(self):
+        """What it saw until now."""
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdin.close()
+        self.process.stdout.close()
+
+
+def robot_at(port, **more):
+    return EgmRobot("127.0.0.1", port, **{"silence": SILENCE, "connect": SILENCE} | more)
+
+
+def swing(cycles, width=0.02, period=0.004):
+    """There and back, for so many cycles."""
+    t = period * np.arange(cycles - 1.0)
+    shape = 0.5 - 0.5 * np.cos(2 * np.pi * t / t[-1])
+    poses = np.array(HOME) + shape[:, None] * np.array([width, 0.0, 0.0, 0.2])
+    return Course(t, poses, np.zeros(len(t), int), ("swing",), (-1,))
+
+
+def moved(controller, robot, cycles, told=None):
+    course = swing(cycles)
+    course.check(robot.limits)
+    return stream(Played(course, robot.limits.period), robot, robot.clock, told=told)
+
+
+@pytest.mark.parametrize("cycles", [500, pytest.param(15000, marks=pytest.mark.slow)])
+def test_every_cycle_is_answered(cycles):
+    with Controller() as controller, robot_at(controller.port) as robot:
+        ended = moved(controller, robot, cycles)
+        seen = controller.asked()
+    assert ended.outcome == DONE
+    assert seen["answered"] >= cycles
+    assert seen["worst"] == 0
+    assert seen["stopped"] < 0
+    times = np.array([cycle.time for cycle in ended.cycles])
+    assert np.allclose(np.diff(times), 0.004)
+    # The tool is where the plan has it, with the speed fed forward.
+    assert ended.off < 0.0005
+    assert max(cycle.late for cycle in ended.cycles) < 0.004
+
+
+def test_poses_go_through_the_base_frame():
+    base = (0.3, -0.2, 0.05, 1.0)
+    with Controller() as controller, robot_at(controller.port, base=base) as robot:
+        tool = robot.state().pose
+        c, s = math.cos(1.0), math.sin(1.0)
+        place = np.array([[c, -s], [s, c]]) @ tool[:2] + base[:2]
+        assert np.allclose(place, HOME[:2])
+        assert tool[2] + 0.05 == pytest.approx(HOME[2])
+        assert tool[3] + 1.0 == pytest.approx(HOME[3])
+        robot.send(Target(robot.time + 0.004, tool, np.zeros(4)))
+        robot.receive()
+        assert np.allclose(controller.asked()["pose"], HOME, atol=1e-6)
+
+
+def test_a_controller_that_is_killed_or_freezes_ends_the_run():
+    with Controller() as controller, robot_at(controller.port, silence=0.5) as robot:
+        count = 0
+
+        def told(cycle):
+            nonlocal count
+            count += 1
+            if count == 100:
+                controller.process.kill()
+
+        ended = moved(controller, robot, 500, told)
+        robot.stop()
+    assert "silent for 0.5 s" in ended.outcome
+    assert 99 <= len(ended.cycles) <= 102
+    with Controller("--freeze", 100) as controller, robot_at(controller.port, silence=0.5) as robot:
+        ended = moved(controller, robot, 500)
+    assert "silent for 0.5 s" in ended.outcome
+    assert 99 <= len(ended.cycles) <= 101
+
+
+CLIENT = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from tests.unit.test_execution_egm import moved, robot_at
+with robot_at(int(sys.argv[1])) as robot:
+    print("ready", flush=True)
+    moved(None, robot, 100000)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["killed", "frozen"])
+def test_the_arm_stops_within_25_cycles_when_this_side_is_killed_or_freezes(how):
+    import signal
+
+    with Controller("--patience", 0.2) as controller:
+        words = [sys.executable, "-c", CLIENT, str(controller.port), str(SCRIPT.parents[1])]
+        client = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
+        try:
+            client.stdout.readline()
+            while controller.asked()["answered"] < 100:
+                time.sleep(0.01)
+            client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+            while (seen := controller.asked())["stopped"] < 0:
+                time.sleep(0.05)
+            time.sleep(0.3)
+            later = controller.asked()
+        finally:
+            client.kill()
+            client.wait()
+            client.stdout.close()
+    # 25 cycles of 4 ms are 100 ms; after them the arm stays where it is.
+    assert seen["worst"] == 25
+    assert later["farthest"] < 1e-9
+    assert later["cycles"] > seen["stopped"]
+
+
+def test_messages_that_have_waited_are_passed_over():
+    """A side that stood still goes on from the newest message, and one that stood still for too long stops."""
+    with Controller("--patience", 0.001) as controller, robot_at(controller.port) as robot:
+        robot.receive()
+        robot.stop()
+        begun = robot.time
+        while controller.asked()["worst"] < 20:
+            time.sleep(0.001)
+        robot.clock.now()
+        assert robot.time - begun >= 0.08
+        ended = moved(controller, robot, 500, lambda cycle: time.sleep(0.3 * (cycle.time > 0.1)))
+    assert "late" in ended.outcome or "RAPID is not running" in ended.outcome
+
+
+def test_nobody_answers():
+    with pytest.raises(RobotFault, match=r"no EGM message from 127.0.0.1 on UDP port \d+ within 0.2 s"):
+        robot_at(free_port(), connect=0.2).__enter__()
+    with Controller() as controller:
+        with pytest.raises(RobotFault, match=r"no EGM message from 10\.0\.0\.1"):
+            EgmRobot("10.0.0.1", controller.port, connect=0.5).__enter__()
+        port = controller.port
+        with robot_at(port), pytest.raises(RobotFault, match=f"UDP port {port} cannot be listened on"):
+            robot_at(port).__enter__()
+
+
+@pytest.mark.slow
+def test_it_conforms():
+    controllers = []
+
+    def make():
+        if controllers:
+            controllers.pop().__exit__()
+        controllers.append(Controller())
+        return robot_at(controllers[-1].port, silence=1.0)
+
+    try:
+        assert len(check_robot(make, kill=lambda robot: controllers[-1].process.kill())) == 10
+    finally:
+        controllers.pop().__exit__()
+
+
+@pytest.mark.slow
+def test_a_plan_ends_in_the_cell_as_without_the_network(three_feet, tmp_path):
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(three_feet, (-0.02, -0.04, 0.2), pusher=pusher, pushes=pushes))
+    plan.save(tmp_path / "plan.json")
+    off = (0.0005, -0.0005, 0.01)
+    with Controller("--plan", tmp_path / "plan.json", "--start", *off) as controller:
+        address = f"egm://127.0.0.1:{controller.port}?silence={SILENCE}&connect={SILENCE}"
+        with open_robot(address, plan) as robot:
+            ended = run(plan, robot)
+            there = np.array(controller.asked()["object"])
+    assert ended.outcome == DONE
+    with open_robot(f"mujoco://tool?start=0.5,-0.5,{math.degrees(0.01)}", plan) as robot:
+        run(plan, robot)
+        here = robot.object
+    assert np.hypot(*(here - there)[:2]) < 0.0005
+    assert abs(here[2] - there[2]) < math.radians(0.3)
