@@ -13,11 +13,12 @@ from flatpush.control.laws.path_following import PathController
 from flatpush.control.laws.reference import AbstractReference, FlatState, PathReference, check_reference
 from flatpush.control.laws.steering_model import SteeringModel
 from flatpush.control.learning.belief import SteeringBelief
-from flatpush.control.loop.closed_loop import drive
+from flatpush.control.loop.closed_loop import drive, limits_used
 from flatpush.control.loop.limits import Limits
+from flatpush.control.tracking.carried import CarriedController
 from flatpush.control.tracking.learning_controller import LearningController
 from flatpush.friction import Ellipsoid
-from flatpush.geometry import compose, pose_error, transform
+from flatpush.geometry import compose, pose_error, relative, transform
 from flatpush.simulation.plant import Plant
 
 UNIT = 0.02  # the paper's normalising length [m]
@@ -324,3 +325,58 @@ def test_the_posture_law_arrives_along_the_goal():
     )
     found = run(controller, plant, np.array([-0.002, 0.0, 0.05]), 60)
     assert found.outcome == "arrived"
+
+
+def test_a_loop_of_one_s_own_runs_with_a_plant_and_a_sensor_of_one_s_own(capsys, monkeypatch):
+    monkeypatch.syspath_prepend("examples")
+    import own_plant
+
+    run, off = own_plant.main()
+    assert run.outcome == "arrived"
+    assert np.hypot(*off[:2]) < 0.0002
+    assert abs(np.rad2deg(off[2])) < 0.2
+    assert set(run.contacts) <= {"rest", "sticking"}
+    limits = Limits(np.zeros((1, 2)), 0.03, 0.2, np.pi / 2, 0.1, 0.5)
+    assert max(limits_used(run, limits).values()) <= 1.000001
+    assert "0.04 mm" in capsys.readouterr().out
+
+
+def test_an_object_that_slips_in_the_hand_is_found_again_and_noise_is_averaged():
+    """The place in the hand is the mean of all frames; after a slip of 2 mm it is that of the frames since."""
+    _, model = square_push()
+    x, y, heading = model.flat_of([0, 0, 0])
+    law = PathController(model, PathReference.straight([x, y], heading, 0.1, 0.02))
+    outline = fp.Object(SQUARE).outline
+    tips = np.array([[0.0, 0.005], [0.0, -0.005]])
+    controller = CarriedController(law, outline, tips, 0.0)
+    planned = relative(model.pusher, np.zeros(3))
+    rng, state = np.random.default_rng(2), controller.start()
+    hand = np.array([0.0, -0.02, np.pi / 2])
+    for k in range(600):
+        slipped = np.array([0.0, 0.002 if k >= 450 else 0.0, 0.0])
+        noise = rng.standard_normal(3) * [0.0003, 0.0003, np.deg2rad(0.3)]
+        frame = Measurement(k / 30, compose(hand, planned + slipped) + noise, hand)
+        state = controller.noticed(replace(state, seen=replace(state.seen, frame=frame)), frame)
+        if k == 449:
+            # 460 frames, four standard deviations of their mean.
+            assert np.all(
+                np.abs(pose_error(state.grasp, planned)) < 4 / np.sqrt(460) * np.array([3e-4, 3e-4, 0.0052])
+            )
+        if k == 479:  # a second later it is known, more or less
+            assert abs(pose_error(state.grasp, planned + slipped)[1]) < 0.0013
+    assert np.all(np.abs(pose_error(state.grasp, planned + slipped)) < [3e-4, 3e-4, 0.003])
+
+
+def test_the_time_law_of_a_path_keeps_the_turn_rate(one_finger_plan):
+    from flatpush.planning.options import push_option
+    from flatpush.problem.mechanics import named
+
+    scene, segment = one_finger_plan.scene, one_finger_plan.pushes[0]
+    model = SteeringModel.of_car(push_option(scene, named(scene, segment.push)).car)
+    for most in (0.05, 0.02):
+        path = PathReference.of_push(segment, model, pusher=replace(scene.pusher, turn_rate=most))
+        rates = []
+        for k, arc in enumerate(segment.arcs):
+            length, top = path.table[k, 1], path.laws[k].top
+            rates.append(abs(arc.twist[2]) * arc.duration / length * top)
+        assert max(rates) == pytest.approx(most)

@@ -1,11 +1,15 @@
 """The signs, limits and thresholds of the feedback laws, each where a mistake would not show in a closed loop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from flatpush.control.horizon.controller import HorizonController
 from flatpush.control.laws.formulas import AxisGains, Bounds, FlatPose, FlatTarget, along_path, linearised
 from flatpush.control.loop.limits import Limits, braking
-from flatpush.control.loop.measurement import STOP, Command
+from flatpush.control.loop.measurement import STOP, Command, Measurement
+from flatpush.experiments.feedback import task
 
 
 @pytest.mark.parametrize("bend", [10.0, -10.0])
@@ -49,3 +53,35 @@ def test_whatever_is_wanted_the_limits_hold():
         assert np.max(np.hypot(*(tips - before).T)) <= 0.1 * dt
         assert abs(last.velocity[2]) <= np.pi / 2
         yaw, before = yaw + last.velocity[2] * dt, tips
+
+
+def test_a_lifted_hand_has_the_limits_of_travel_and_one_on_the_table_those_of_pushing():
+    """A straight wish that is too fast, from rest: it gets to the speed that it may have, evenly."""
+    limits = Limits(np.zeros((1, 2)), 0.02, 0.1, np.pi / 2, 0.1, 0.5)
+    for height, speed, acceleration in ((0.0, 0.02, 0.1), (0.03, 0.1, 0.5)):
+        last, dt = Command(np.zeros(3), height), 1 / 60
+        speeds = [0.0]
+        for _ in range(60):
+            last = limits.kept(last, 0.0, Command(np.array([1.0, 0.0, 0.0]), height), 0.3, dt)
+            speeds.append(float(last.velocity[0]))
+        assert speeds[-1] == pytest.approx(speed, rel=2e-3)
+        assert np.max(np.diff(speeds)) / dt == pytest.approx(acceleration, rel=2e-3)
+
+
+@pytest.mark.parametrize(("gap", "phase"), [(0.0005, "push"), (0.001, "resume"), (0.005, "resume")])
+def test_a_finger_more_than_seven_tenths_of_a_millimetre_off_the_edge_has_lost_it(gap, phase):
+    scene = replace(task(1).scene, start=(-0.12, 0.0, 0.0))
+    controller = HorizonController.of(scene)
+    (k,) = (k for k, option in enumerate(controller.planner.usable) if option.push.name == "left")
+    tip = controller.planner.usable[k].placement.tips[0]
+    pose = np.asarray(scene.start_pose, dtype=float)
+    hand = np.array([*(pose[:2] + tip), 0.0])
+    frame = Measurement(1.0, pose, hand)
+    state = replace(controller.start(), push=k, tip=tip, landings=1)
+    car = controller.observer.car(state, k, tip)
+    state = replace(
+        state, phase="push", car=car, landed=car.radius, target=np.zeros(3), rest=0.12, allowed=0.2,
+        believed=frame, gap=gap, seen=replace(state.seen, frame=frame),
+    )  # fmt: skip
+    after, _ = controller.act(state, 1.01)
+    assert after.phase == phase

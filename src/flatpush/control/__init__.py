@@ -10,10 +10,11 @@ from .laws.path_following import PathController
 from .laws.reference import AbstractReference, PathReference
 from .laws.steering_model import SteeringModel
 from .learning.belief import SteeringBelief, SteeringEstimate
-from .loop.closed_loop import ClosedLoopRun, drive
+from .loop.closed_loop import ClosedLoopRun, Table, World, drive, limits_used
 from .loop.controller import ARRIVED, AbstractController, ControllerState
+from .loop.limits import Limits
 from .loop.measurement import Command, Measurement
-from .loop.sensor import AbstractSensor, Camera, SimulatedSensor
+from .loop.sensor import AbstractSensor, Camera, SensorState, SimulatedSensor
 from .tracking.learning_controller import LearningController
 from .tracking.plan_controller import PlanController
 
@@ -29,15 +30,20 @@ __all__ = [
     "Gains",
     "HorizonController",
     "LearningController",
+    "Limits",
     "Measurement",
     "PathController",
     "PathReference",
     "PlanController",
     "PostureController",
+    "SensorState",
     "SimulatedSensor",
     "SteeringBelief",
     "SteeringEstimate",
     "SteeringModel",
+    "Table",
     "TrackingController",
+    "World",
     "drive",
+    "limits_used",
 ]

@@ -91,7 +91,7 @@ def drive(
     """Runs the loop from an object at X_WO and a hand at X_WE until the controller has an outcome or time is out.
 
     Args:
-        sensor: a SimulatedSensor is shown the plant at every tick.
+        sensor: it is shown the plant at every tick.
         duration: at most so long [s]. begin: time of the first tick [s].
         told: called at every tick with the time and the controller's state.
     """
@@ -99,7 +99,6 @@ def drive(
         raise InputError("a duration is positive and finite", key="duration", value=duration)
     dt = 1 / controller.rate
     world, state, eyes = plant.start(start, hand), controller.start(begin), sensor.start()
-    expose = getattr(sensor, "expose", None)
     times, objects, hands, heights, modes, contacts = [], [], [], [], [], []
     notes: dict[str, float] = {}
     outcome = ""
@@ -107,8 +106,7 @@ def drive(
     for k in range(int(np.ceil(duration * controller.rate)) + 1):
         time = begin + k * dt
         at = world.hand if lifted is None else lifted
-        if expose is not None:
-            eyes = expose(eyes, time, world.object, at)
+        eyes = sensor.expose(eyes, time, world.object, at)
         eyes, frames = sensor.arrived(eyes, time)
         state, command = controller.step(state, frames[-1] if frames else None, time)
         times.append(time)

@@ -251,9 +251,7 @@ def _between(before: HandMotion, goal: HandMotion, share: float) -> HandMotion:
 def _fits(
     last: HandMotion, motion: HandMotion, yaw: float, dt: float, tips: Array, limits: HandLimits
 ) -> bool:
-    """Whether a motion keeps to the limits after the last one, at the starts and the ends of both ticks."""
-    if abs(motion.spin) > USED * limits.turn_rate:
-        return False
+    """Whether the fingertips keep to their limits after the last motion, at the starts and the ends of both ticks."""
     speed, most = USED * limits.speed, USED * limits.acceleration * dt
     for i in range(tips.shape[0]):
         x, y = tips[i, 0], tips[i, 1]

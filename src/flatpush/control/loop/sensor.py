@@ -71,6 +71,10 @@ class AbstractSensor(ABC):
     def start(self) -> SensorState:
         """The state before the first frame."""
 
+    def expose(self, state: SensorState, time: float, object: ArrayLike, pusher: ArrayLike) -> SensorState:
+        """Shows the object X_WO and the pusher X_WE at a time [s] to a simulated sensor; others look for themselves."""
+        return state
+
     @abstractmethod
     def arrived(self, state: SensorState, time: float) -> tuple[SensorState, tuple[Measurement, ...]]:
         """The frames that have come since the last call, by a time [s]."""

@@ -8,38 +8,38 @@ from ...geometry import Outline, compose, pose_error, relative
 from ...geometry.pose import Array
 from ..laws.linearisation import TrackingController
 from ..laws.path_following import PathController
-from ..loop.controller import AbstractController, ControllerState
 from ..loop.frames import hand
-from ..loop.limits import Limits
 from ..loop.measurement import Command, Measurement
+from .law_runner import AbstractLawRunner, RunnerState
 
 # The place at which it landed counts as so many frames: the object was seen so often before.
 KNOWN = 10
-# What was seen longer ago is forgotten [s]; an object that slips in the hand is found again after that.
-MEMORY = 2.0
+# The mean of the last frames, over so long [s], tells whether the object has slipped in the hand: then it is off the
+# mean of all by more than so many standard deviations of its own noise, and the frames from before are forgotten.
+MEMORY, SLIPPED = 2.0, 5.0
 # Steps of Newton's method towards touching fingers.
 ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CarriedState(ControllerState):
+class CarriedState(RunnerState):
     """Of CarriedController.
 
     Attributes:
-        inner: state of the law.
         grasp: X_EO, the mean of what was seen, shape (3,); touching: the same with both fingers on the outline.
         count: of the frames in the mean. newest: exposure of the last of them [s].
+        late: X_EO, the mean of what was seen of late, shape (3,).
     """
 
-    inner: ControllerState
     grasp: Array
     touching: Array
     count: float
     newest: float
+    late: Array
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedController(AbstractController[CarriedState]):
+class CarriedController(AbstractLawRunner[CarriedState]):
     """Runs the law of one push with the pose of an object that two fingers hold.
 
     Fingers that stick carry the object along, so that the hand's own pose, which is known far better than what a camera
@@ -48,45 +48,46 @@ class CarriedController(AbstractController[CarriedState]):
 
     Args:
         inner: the law. outline: of the object. tips: centres of the fingertips in E, shape (2, 2).
-        tip_radius: [m].
+        tip_radius: [m]. noise: of a frame, see AbstractController.
     """
 
     inner: TrackingController | PathController
     outline: Outline
     tips: Array
     tip_radius: float
-
-    @property
-    def rate(self) -> float:  # type: ignore[override]
-        return self.inner.rate
-
-    @property
-    def limits(self) -> Limits | None:  # type: ignore[override]
-        return self.inner.limits
+    noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
 
     def start(self, time: float = 0.0) -> CarriedState:
         planned = relative(self.inner.model.pusher, np.zeros(3))
         return CarriedState(
-            inner=self.inner.start(time), grasp=planned, touching=planned, count=KNOWN, newest=time
+            inner=self.inner.start(time),
+            grasp=planned,
+            touching=planned,
+            count=KNOWN,
+            newest=time,
+            late=planned,
         )
 
     def noticed(self, state: CarriedState, frame: Measurement) -> CarriedState:
         if frame.time < state.newest:
             return state
-        off = pose_error(relative(frame.pusher, frame.object), state.grasp)
-        gain = max(1 / (state.count + 1), min(1.0, (frame.time - state.newest) / MEMORY))
-        grasp = np.asarray(state.grasp + gain * off)
+        seen, count = relative(frame.pusher, frame.object), state.count + 1
+        share = max(1 / count, min(1.0, (frame.time - state.newest) / MEMORY))
+        grasp = np.asarray(state.grasp + pose_error(seen, state.grasp) / count)
+        late = np.asarray(state.late + share * pose_error(seen, state.late))
+        # A mean that takes a share of each frame scatters by √(share / 2) of a frame.
+        sd = np.sqrt(0.5 * share) * np.array([self.noise[0], self.noise[0], self.noise[1]])
+        if np.any(np.abs(pose_error(late, grasp)) > SLIPPED * sd):
+            grasp, count = late, 1 / share
         return replace(
-            state, grasp=grasp, touching=self._touching(grasp), count=state.count + 1, newest=frame.time
+            state, grasp=grasp, touching=self._touching(grasp), count=count, newest=frame.time, late=late
         )
 
     def act(self, state: CarriedState, time: float) -> tuple[CarriedState, Command]:
         assert state.seen.frame is not None
         pose = compose(hand(state.seen.frame, state.seen.told, time), state.touching)
         below = replace(state.inner, seen=state.seen)
-        below, command = self.inner.follow(below, pose, time)  # type: ignore[arg-type]
-        carried = replace(state, inner=below, mode=below.mode, note=below.note, outcome=below.outcome)
-        return carried, command
+        return self.ran(state, *self.inner.follow(below, pose, time))  # type: ignore[arg-type]
 
     def _touching(self, grasp: Array) -> Array:
         """The pose nearest to a grasp X_EO at which both fingertips touch, angles counted by the object's size."""

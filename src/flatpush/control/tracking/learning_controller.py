@@ -9,30 +9,27 @@ from ...errors import InputError
 from ...geometry import log, relative
 from ..laws.linearisation import TrackingController
 from ..laws.path_following import PathController
-from ..laws.steering_model import SteeringModel
 from ..learning.belief import SteeringBelief
-from ..loop.controller import AbstractController, ControllerState
-from ..loop.limits import Limits
 from ..loop.measurement import Command, Measurement
+from .law_runner import AbstractLawRunner, RunnerState
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LearningState(ControllerState):
+class LearningState(RunnerState):
     """Of LearningController.
 
     Attributes:
-        inner: state of the controller it runs. controller: that, with the model as it is known now.
+        controller: the law with the model as it is known now.
         belief: what was learned. since: the frame that the stretch to be learned from began with.
     """
 
-    inner: ControllerState
     controller: TrackingController | PathController
     belief: SteeringBelief
     since: Measurement | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class LearningController(AbstractController[LearningState]):
+class LearningController(AbstractLawRunner[LearningState]):
     """Runs another controller with the model that the motion seen so far makes likely.
 
     The estimate is used once it knows the heading of the axle clearly better than the prior did, unless it lies far
@@ -54,25 +51,12 @@ class LearningController(AbstractController[LearningState]):
         if not (min(self.sd) > 0 and self.stretch > 0):
             raise InputError("standard deviations and stretch are positive", value=(self.sd, self.stretch))
 
-    @property
-    def rate(self) -> float:  # type: ignore[override]
-        return self.inner.rate
-
-    @property
-    def limits(self) -> Limits | None:  # type: ignore[override]
-        return self.inner.limits
-
-    @property
-    def model(self) -> SteeringModel:
-        return self.inner.model
-
     def start(self, time: float = 0.0) -> LearningState:
         return LearningState(inner=self.inner.start(time), controller=self.inner, belief=self.prior)
 
     def act(self, state: LearningState, time: float) -> tuple[LearningState, Command]:
-        below, command = state.controller.act(replace(state.inner, seen=state.seen), time)  # type: ignore[arg-type]
-        learned = replace(state, inner=below, mode=below.mode, note=below.note, outcome=below.outcome)
-        return learned, command
+        below = replace(state.inner, seen=state.seen)
+        return self.ran(state, *state.controller.act(below, time))  # type: ignore[arg-type]
 
     def noticed(self, state: LearningState, frame: Measurement) -> LearningState:
         if state.since is None:

@@ -158,7 +158,9 @@ class PlanController(AbstractController[PlanState]):
             else:
                 one = PathController(model, path, rate, deceleration=braking, stale=stale)
             if len(segment.fingers) == 2:
-                one = CarriedController(one, scene.object.outline, segment.fingers, scene.pusher.tip_radius)
+                one = CarriedController(
+                    one, scene.object.outline, segment.fingers, scene.pusher.tip_radius, sd
+                )
             elif learn:
                 one = _learning(scene, option, one, sd)
             found.append(one)
@@ -263,8 +265,7 @@ class PlanController(AbstractController[PlanState]):
         return abs(float(ahead)) > LOST_AHEAD * size or abs(float(aside)) > LOST_ASIDE * size
 
     def _model(self, push: int) -> SteeringModel:
-        one = self.inner[push]
-        return one.inner.model if isinstance(one, CarriedController) else one.model
+        return self.inner[push].model
 
 
 def _model(scene: Scene, option: PushOption) -> SteeringModel:
