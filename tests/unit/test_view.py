@@ -40,8 +40,9 @@ from flatpush.problem import (
 from flatpush.simulation.study import Noise, Runs
 from flatpush.view import PushSketch, check_figure, describe_figure, palette, save_figure, save_snapshots
 from flatpush.view.angle_figure import draw_angles
-from flatpush.view.drawing import MARKS, Disc, Drawing, Line, Look, Text, mark
+from flatpush.view.drawing import MARKS, Disc, Drawing, Line, Look, Text, font, mark, text_width
 from flatpush.view.labels import Labels
+from flatpush.view.letters import UNITS, WIDTHS
 from flatpush.view.page import draw_page
 from flatpush.view.panel import Panel, frame_for
 from flatpush.view.plan_figure import cone_length, draw_plan
@@ -320,6 +321,18 @@ def test_the_box_of_a_text_is_what_its_letters_cover():
         assert bottom - 6 < ends[3] < bottom + 1
 
 
+@pytest.mark.parametrize("bold", [False, True])
+def test_letters_are_as_wide_as_those_of_the_font(bold):
+    table = WIDTHS[bold]
+    assert len(table) > 250
+    letters = font(UNITS, bold)
+    for letter, width in table.items():
+        assert letters.getlength(letter) == pytest.approx(width, abs=1), letter
+    line = "Egypt: 180 mm (lifted), α = −3.5°"
+    assert text_width(line, 9.0, bold) == pytest.approx(letters.getlength(line) * 9.0 / UNITS, rel=0.02)
+    assert text_width("三角", 9.0, bold) == pytest.approx(letters.getlength("三角") * 9.0 / UNITS)
+
+
 @pytest.mark.parametrize("edge", [0.06, 0.3])
 def test_the_goal_and_start_labels_lie_on_no_line(edge):
     """Bounds are lines too; at 0.06 they run where the label of the goal would be liked best."""
@@ -531,6 +544,19 @@ def test_a_missing_folder_and_a_folder_are_refused(tmp_path):
 
 def test_importing_the_package_imports_neither_matplotlib_nor_pillow():
     code = "import sys, flatpush.view; print([m for m in ('matplotlib', 'PIL') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_picture_in_svg_needs_no_font(tmp_path):
+    """Loading one takes longer than drawing."""
+    plan = make_plan(pushes=2)
+    plan.save(tmp_path / "plan.json")
+    code = (
+        "import sys; from flatpush.documents import load_plan; from flatpush.view import save_figure;"
+        f"save_figure(load_plan({str(tmp_path / 'plan.json')!r}), {str(tmp_path / 'plan.svg')!r});"
+        "print([m for m in ('matplotlib', 'PIL', 'html', 'colorsys') if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

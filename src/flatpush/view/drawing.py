@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..geometry.pose import Array
+from .letters import UNITS, WIDTHS
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont
@@ -22,7 +23,6 @@ Anchor = Literal["start", "middle", "end"]
 INK, SOFT, GRID = "#1a1a1a", "#555555", "#ececec"
 PAGE = 576.0  # width of a page [pt]: 8 inches
 ASCENT, DESCENT = 0.76, 0.24  # of a line of DejaVu Sans, in sizes of the letters
-_MEASURED_AT = 100  # size at which letters are measured [pt]
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,11 @@ def wrapped(text: str, size: float, room: float, bold: bool = False, most: int =
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
     """Length of a line of DejaVu Sans [pt]."""
-    return float(font(_MEASURED_AT, bold).getlength(text)) * size / _MEASURED_AT
+    widths = WIDTHS[bold]
+    try:
+        return sum(widths[letter] for letter in text) * size / UNITS
+    except KeyError:  # letters that our table has not
+        return float(font(UNITS, bold).getlength(text)) * size / UNITS
 
 
 @cache

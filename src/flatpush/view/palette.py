@@ -4,8 +4,6 @@ The first colours of the pushes follow Okabe and Ito (2008), darkened where a th
 none of them is the black of the start, the blue of the goal, or the red of obstacles and simulated runs.
 """
 
-import colorsys
-
 START = "#111111"
 GOAL = "#0061b5"
 SIMULATED = "#d62728"
@@ -31,6 +29,8 @@ def push_colour(number: int) -> str:
     """The colour of the push with this number, from 0; no two pushes of a plan share one."""
     if number < len(PUSHES):
         return PUSHES[number]
+    import colorsys
+
     # Hues a golden section apart never meet again; the lightness keeps neighbours apart as well.
     k = number - len(PUSHES)
     rgb = colorsys.hls_to_rgb((0.13 + 0.6180339887 * k) % 1.0, 0.34 + 0.07 * (k % 3), 0.55)

@@ -1,12 +1,12 @@
 """A drawing as SVG, as wide as its page allows. Letters stay letters: they can be searched, copied and read aloud."""
 
 import re
-from html import escape
 
 from ..geometry.pose import Array
 from .drawing import Box, Disc, Drawing, Item, Look, Text, thinned
 
 FONTS = "DejaVu Sans, Verdana, Segoe UI, Helvetica, Arial, sans-serif"
+_NAMES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&#x27;"}  # & first
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # XML forbids them
 
 
@@ -59,7 +59,9 @@ def svg_text(drawing: Drawing) -> str:
 
 def clean(text: str) -> str:
     """Text that may stand between tags and in attributes."""
-    return escape(_CONTROL.sub("\ufffd", text))
+    for letter, name in _NAMES.items():
+        text = text.replace(letter, name)
+    return _CONTROL.sub("\ufffd", text)
 
 
 def _element(item: Item) -> str:
