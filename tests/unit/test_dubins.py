@@ -117,5 +117,5 @@ def test_radii_without_digits_are_refused(radius):
 def test_strings_and_booleans_are_no_numbers(pose):
     with pytest.raises(InputError, match="numbers"):
         dubins.shortest_path(pose, (1, 0, 0), 1.0)
-    with pytest.raises(InputError, match="3 numbers"):
+    with pytest.raises(InputError, match="3 finite numbers"):
         shortest_word((0, 1), (0, -1), (1, 0), pose, (1, 0, 0))

@@ -140,6 +140,16 @@ def test_an_older_plan_loads_with_the_defaults(documents):
     assert fp.verify(plan).ok
 
 
+def test_what_no_friction_is_enough_for_is_as_stated():
+    """A margin of -inf differed from itself (found by benchmarks/soak.py) and was as good as any other number."""
+    from flatpush.simulation.verify import _agree
+
+    assert _agree(-np.inf, -np.inf)
+    assert not _agree(-np.inf, np.inf)
+    assert not _agree(-np.inf, 0.3)
+    assert not _agree(float("nan"), 0.3)
+
+
 def test_a_failed_claim_says_where_by_how_much_and_what_is_allowed(documents):
     document = edited(documents["two"], "first['height'].__setitem__(n, -0.05)")
     (claim,) = (c for c in fp.verify(parse_plan(document)).failed if "below the table" in c.name)

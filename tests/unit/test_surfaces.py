@@ -254,7 +254,7 @@ def test_a_quartic_that_is_nearly_flat_can_be_inverted() -> None:
         (squared(np.ones((3, 3))), "bounds every wrench"),
         ([1] * 14, "15"),
         ([1] * 14 + [np.inf], "15 finite"),
-        (["a"] * 15, "15 numbers"),
+        (["a"] * 15, "15 finite"),
     ],
 )
 def test_no_quartic(coefficients: list[float], message: str) -> None:

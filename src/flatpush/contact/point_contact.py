@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import is_finite, numbers, vector
 from ..errors import InputError
 from ..friction.surface import LimitSurface, WrenchSet
 from ..geometry import cross, perpendicular, rotate, velocity_at
@@ -70,14 +71,12 @@ class PointContact:
     hook: bool = False
 
     def __post_init__(self) -> None:
-        point, normal = np.array(self.point, dtype=float), np.array(self.normal, dtype=float)
-        for name, value in (("point", point), ("normal", normal)):
-            if value.shape != (2,) or not np.all(np.isfinite(value)):
-                raise InputError(f"the {name} of a contact is two finite numbers", value=getattr(self, name))
+        point = vector(self.point, 2, "the point of a contact is two finite numbers")
+        normal = vector(self.normal, 2, "the normal of a contact is two finite numbers")
         length = float(np.hypot(*normal))
         if length == 0:
             raise InputError("the normal of a contact is not zero", value=self.normal)
-        if not (np.isfinite(self.friction) and self.friction >= 0):
+        if not (is_finite(self.friction) and self.friction >= 0):
             raise InputError("friction is a finite number, 0 or more", value=self.friction)
         normal = normal / length
         if not self.hook and float(point @ normal) > 1e-9 * float(np.hypot(*point)):
@@ -102,7 +101,7 @@ class PointContact:
 
     def wrench(self, force: ArrayLike) -> Array:
         """J_pᵀ f: the wrench of forces of shape (..., 2) at the contact point."""
-        f = np.asarray(force, dtype=float)
+        f = numbers(force, "a force is two numbers")
         return np.concatenate([f, cross(self.point, f)[..., None]], axis=-1)
 
     def motion_cone(self, surface: LimitSurface) -> ConeEdges:
@@ -118,9 +117,7 @@ class PointContact:
         force to velocity is monotone). Otherwise it slides with the force on the near edge, and the twist of
         that edge is scaled to the pusher's normal velocity.
         """
-        u = np.asarray(pusher_velocity, dtype=float)
-        if u.shape != (2,) or not np.all(np.isfinite(u)):
-            raise InputError("a pusher velocity is two finite numbers", value=pusher_velocity)
+        u = vector(pusher_velocity, 2, "a pusher velocity is two finite numbers")
         still, none = np.zeros(3), np.zeros(2)
         tangent = perpendicular(self.normal)
         if not np.any(u):

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import is_finite
 from ..errors import InputError, NoDubinsReduction
 from ..friction.patches import patches as divided
 from ..friction.support import Support
@@ -96,7 +97,7 @@ class TableSet:
         Raises:
             InputError: for a share that is not at least 0 and less than 1.
         """
-        if isinstance(share, bool) or not (np.isfinite(share) and 0 <= share < 1):
+        if not (is_finite(share) and 0 <= share < 1):
             raise InputError(
                 "the share by which loads may differ is at least 0 and less than 1", key="loads", value=share
             )

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite
 from ..friction.surface import LimitSurface, WrenchSet
 from ..geometry import cross, perpendicular
 from ..geometry.pose import Array
@@ -21,7 +22,7 @@ def two_point_sticks(contacts: Sequence[PointContact], surface: LimitSurface, tw
     with its origin at the centre of friction. A rotation about a support point leaves that point's friction
     free: any of the wrenches will do.
     """
-    return _inside(contacts, surface.wrench_set(twist))
+    return _inside(contacts, surface.wrench_set(finite(twist, "a twist is three finite numbers")))
 
 
 def composite_margin(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> float:

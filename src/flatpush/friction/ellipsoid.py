@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite, numbers
 from ..errors import InputError
 from ..geometry.pose import Array
 from .surface import LimitSurface
@@ -37,11 +38,8 @@ class Ellipsoid(LimitSurface):
     degree = 2
 
     def __post_init__(self) -> None:
-        try:
-            A = np.array(self.matrix, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError("the matrix of an ellipsoid is 3 × 3 numbers", value=self.matrix) from None
-        if A.shape != (3, 3) or not np.isfinite(A).all():
+        A = finite(self.matrix, "the matrix of an ellipsoid is 3 × 3 finite numbers")
+        if A.shape != (3, 3):
             raise InputError("the matrix of an ellipsoid is 3 × 3 finite numbers", value=self.matrix)
         # Judged with unit diagonal, so that the unit of length does not matter.
         if np.any(np.diag(A) <= 0):
@@ -58,16 +56,16 @@ class Ellipsoid(LimitSurface):
         object.__setattr__(self, "_inverse", np.linalg.inv(A))
 
     def value(self, wrench: ArrayLike) -> Array:
-        F = np.asarray(wrench, dtype=float)
+        F = numbers(wrench, "a wrench is three numbers")
         return np.sum((F @ self.matrix) * F, axis=-1)
 
     def twist(self, wrench: ArrayLike) -> Array:
         """A F, shape (..., 3)."""
-        return np.asarray(wrench, dtype=float) @ self.matrix
+        return finite(wrench, "a wrench is three finite numbers") @ self.matrix
 
     def wrench(self, twist: ArrayLike) -> Array:
         """A⁻¹ V, scaled to H = 1, shape (..., 3)."""
-        V = np.asarray(twist, dtype=float)
+        V = finite(twist, "a twist is three finite numbers")
         if not np.all(np.any(V != 0, axis=-1)):
             raise InputError("a zero twist has no wrench of its own", value=twist)
         F: Array = V @ self._inverse  # type: ignore[attr-defined]

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite, vector
 from ..errors import InputError
 from ..geometry.pose import Array
 from .least import least_dissipation
@@ -85,9 +86,8 @@ class Exact(LimitSurface):
 
         With k the rotation about p, V = V₀ + ω k, where h is least along that line: k·∇h = 0.
         """
-        p, u = np.asarray(point, dtype=float), np.asarray(velocity, dtype=float)
-        if p.shape != (2,) or u.shape != (2,) or not (np.isfinite(p).all() and np.isfinite(u).all()):
-            raise InputError("a point and its velocity are two finite numbers each", value=(point, velocity))
+        rule = "a point and its velocity are two finite numbers each"
+        p, u = vector(point, 2, rule), vector(velocity, 2, rule)
         speed = float(np.hypot(u[0], u[1]))
         if speed == 0:
             return np.zeros(3)
@@ -214,7 +214,7 @@ class Exact(LimitSurface):
 
 
 def _vectors(values: ArrayLike, what: str) -> Array:
-    vectors = np.asarray(values, dtype=float)
-    if vectors.shape[-1:] != (3,) or not np.isfinite(vectors).all():
+    vectors = finite(values, f"{what} is three finite numbers")
+    if vectors.shape[-1:] != (3,):
         raise InputError(f"{what} is three finite numbers", value=values)
     return vectors

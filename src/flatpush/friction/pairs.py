@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import numbers
 from ..errors import InputError
 from ..geometry.pose import Array
 
@@ -41,7 +42,7 @@ class Pairs:
 
 def checked_pairs(wrenches: ArrayLike, twists: ArrayLike, needed: int, what: str) -> tuple[Array, Array]:
     """The wrenches and twists (n, 3) as arrays of at least so many finite rows, none of them zero."""
-    F, V = np.array(wrenches, dtype=float), np.array(twists, dtype=float)
+    F, V = (numbers(rows, "wrenches and twists are numbers") for rows in (wrenches, twists))
     if F.ndim != 2 or F.shape[1:] != (3,) or V.shape != F.shape:
         raise InputError("wrenches and twists have the same shape (n, 3)", value=(F.shape, V.shape))
     if not (np.isfinite(F).all() and np.isfinite(V).all()):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite, vector
 from ..errors import FlatpushError, InputError
 from ..geometry.pose import Array
 from .sos import best_gram, coefficients_of, gram_defect, tensor, tensor_of_gram
@@ -47,11 +48,8 @@ class Quartic(LimitSurface):
     degree = 4
 
     def __post_init__(self) -> None:
-        try:
-            v = np.array(self.coefficients, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError("a quartic has 15 numbers as coefficients", value=self.coefficients) from None
-        if v.shape != (15,) or not np.isfinite(v).all():
+        v = finite(self.coefficients, "a quartic has 15 finite coefficients")
+        if v.shape != (15,):
             raise InputError("a quartic has 15 finite coefficients", value=self.coefficients)
         if not np.all(v[:3] > 0):
             raise InputError("the coefficients of x⁴, y⁴ and z⁴ are positive", value=v.tolist())
@@ -112,8 +110,8 @@ class Quartic(LimitSurface):
 
     def wrench(self, twist: ArrayLike) -> Array:
         """The F of least H(F) - V·F, scaled to H = 1, shape (..., 3)."""
-        V = np.asarray(twist, dtype=float)
-        if V.shape[-1:] != (3,) or not np.isfinite(V).all() or not np.all(np.any(V != 0, axis=-1)):
+        V = finite(twist, "a twist is three finite numbers, not all zero")
+        if V.shape[-1:] != (3,) or not np.all(np.any(V != 0, axis=-1)):
             raise InputError("a twist is three finite numbers, not all zero", value=twist)
         flat = (V * self._units).reshape(-1, 3)
         F = np.array([_conjugate(self._tensor, b / np.sqrt(b @ b)) for b in flat]).reshape(V.shape)
@@ -122,9 +120,8 @@ class Quartic(LimitSurface):
 
     def stick(self, point: ArrayLike, velocity: ArrayLike) -> Array:
         """∇H(Jᵀf) for the f of least H(Jᵀf) - u·f, a strictly convex problem in the plane."""
-        p, u = np.asarray(point, dtype=float), np.asarray(velocity, dtype=float)
-        if p.shape != (2,) or u.shape != (2,) or not (np.isfinite(p).all() and np.isfinite(u).all()):
-            raise InputError("a point and its velocity are two finite numbers each", value=(point, velocity))
+        rule = "a point and its velocity are two finite numbers each"
+        p, u = vector(point, 2, rule), vector(velocity, 2, rule)
         speed = float(np.hypot(u[0], u[1]))
         if speed == 0:
             return np.zeros(3)
@@ -138,7 +135,7 @@ class Quartic(LimitSurface):
         return 4 * speed * scale * (_contracted(self._tensor, F) @ F) / self._units
 
     def _balanced(self, wrench: ArrayLike) -> Array:
-        F = np.asarray(wrench, dtype=float)
+        F = finite(wrench, "a wrench is three finite numbers")
         if F.shape[-1:] != (3,):
             raise InputError("a wrench is three numbers (fx, fy, τ)", value=wrench)
         return F / self._units

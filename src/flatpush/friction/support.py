@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite, is_finite, vector
 from ..errors import InputError
 from ..geometry.outline import Outline
 from ..geometry.pose import Array
@@ -51,10 +52,14 @@ class Support:
         Raises:
             InputError: for a negative weight, no weight at all, or a single place (which resists no turning).
         """
-        places = _finite(xy, "the points of a support")
+        places = finite(xy, "the points of a support are finite numbers")
         if places.ndim != 2 or places.shape[1] != 2 or len(places) == 0:
             raise InputError("the points of a support are a list of [x, y]", value=xy)
-        shares = np.ones(len(places)) if weights is None else _finite(weights, "the weights of a support")
+        shares = (
+            np.ones(len(places))
+            if weights is None
+            else finite(weights, "the weights of a support are finite numbers")
+        )
         if shares.shape != (len(places),):
             raise InputError(f"a support of {len(places)} points has as many weights", value=weights)
         if np.any(shares < 0):
@@ -160,7 +165,7 @@ class Support:
         flat = V.reshape(-1, 3)
         if not np.all(np.any(flat != 0, axis=1)):
             raise InputError("a zero twist has no wrench of its own", value=twist)
-        if not (np.isfinite(friction * load) and friction >= 0 and load >= 0):
+        if not (is_finite(friction) and is_finite(load) and friction >= 0 and load >= 0):
             raise InputError("friction and load are finite and not negative", value=(friction, load))
         W = self.pressure.resist(flat)[1].reshape(V.shape)
         W[..., 2] += self.centre[0] * W[..., 1] - self.centre[1] * W[..., 0]
@@ -190,8 +195,8 @@ class Support:
 
     def _centred_twist(self, twist: ArrayLike) -> Array:
         """The twists (..., 3), about the centre of pressure."""
-        V = np.array(twist, dtype=float)
-        if V.shape[-1:] != (3,) or not np.isfinite(V).all():
+        V = finite(twist, "a twist is three finite numbers (vx, vy, ω)")
+        if V.shape[-1:] != (3,):
             raise InputError("a twist is three finite numbers (vx, vy, ω)", value=twist)
         V[..., 0] -= self.centre[1] * V[..., 2]
         V[..., 1] += self.centre[0] * V[..., 2]
@@ -207,22 +212,10 @@ class Support:
 
     @classmethod
     def _round(cls, radius: float, centre: ArrayLike, filled: bool) -> "Support":
-        if isinstance(radius, bool) or not (np.isfinite(radius) and radius > 0):
+        if not (is_finite(radius) and radius > 0):
             raise InputError("the radius of a support is positive and finite", value=radius)
-        place = _finite(centre, "the centre of a support")
-        if place.shape != (2,):
-            raise InputError("the centre of a support is [x, y]", value=centre)
+        place = vector(centre, 2, "the centre of a support is [x, y], finite numbers")
         return cls(_kept(place), Round(float(radius), filled))
-
-
-def _finite(values: ArrayLike, what: str) -> Array:
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} are numbers", value=values) from None
-    if not np.isfinite(array).all():
-        raise InputError(f"{what} are finite numbers", value=values)
-    return array
 
 
 def _kept(array: Array) -> Array:

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import is_finite, numbers, vector
 from ..errors import InputError
 from .pose import Array, cross, perpendicular
 
@@ -58,7 +59,7 @@ class Outline:
         Raises:
             InputError: if it has fewer than three corners, no area, or crosses itself.
         """
-        points = np.array(vertices, dtype=float)
+        points = numbers(vertices, "an outline is a list of [x, y] corners")
         if points.ndim != 2 or points.shape[1] != 2:
             raise InputError("an outline is a list of [x, y] corners", value=vertices)
         if not np.all(np.isfinite(points)):
@@ -82,11 +83,9 @@ class Outline:
     @classmethod
     def circle(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Outline":
         """A circle of the given radius [m]."""
-        if not (np.isfinite(radius) and radius > 0):
+        if not (is_finite(radius) and radius > 0):
             raise InputError("the radius of a circle is positive and finite", value=radius)
-        middle = np.array(centre, dtype=float)
-        if middle.shape != (2,) or not np.all(np.isfinite(middle)):
-            raise InputError("the centre of a circle is a point [x, y] of finite numbers", value=centre)
+        middle = vector(centre, 2, "the centre of a circle is a point [x, y] of finite numbers")
         return cls(np.empty((0, 2)), middle, float(radius))
 
     @property
@@ -198,11 +197,13 @@ class Outline:
 
     def at(self, edge: int, along: float) -> OutlinePoint:
         """The point at a place on an edge (polygon), or at the angle 2π · along (circle)."""
+        if not is_finite(along):
+            raise InputError("a place along an edge is a finite number", value=along)
         if self.is_circle:
             angle = 2 * np.pi * along
             out = np.array([np.cos(angle), np.sin(angle)])
             return OutlinePoint(self.centre + self.radius * out, -out, 0, float(along % 1.0))
-        if not 0 <= edge < len(self.vertices):
+        if not (is_finite(edge) and edge == int(edge) and 0 <= edge < len(self.vertices)):
             raise InputError(f"edges count from 0 to {len(self.vertices) - 1}", value=edge)
         start, end = self.edges[edge]
         corner = along <= 1e-9 or along >= 1 - 1e-9

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import is_finite, is_number, numbers, vector
 from ..errors import InputError
 from ..friction.support import Support
 from ..friction.surface import LimitSurface
@@ -37,13 +38,19 @@ class Uncertainty:
             if not good:
                 raise InputError(rule, key=f"object.uncertainty.{key}", value=getattr(self, key))
 
-        need(0 <= self.loads < 1, "loads", "loads differ by a share of at least 0 and less than 1 (100 %)")
         need(
-            bool(np.isfinite(self.offset)) and self.offset >= 0, "offset", "an offset is a length, 0 or more"
+            is_finite(self.loads) and 0 <= self.loads < 1,
+            "loads",
+            "loads differ by a share of at least 0 and less than 1 (100 %)",
         )
+        need(is_finite(self.offset) and self.offset >= 0, "offset", "an offset is a length, 0 or more")
         if self.friction is not None:
             low, high = self.friction
-            need(0 < low <= high < np.inf, "friction", "a range of friction is [low, high], 0 < low ≤ high")
+            need(
+                is_finite(low) and is_finite(high) and 0 < low <= high,
+                "friction",
+                "a range of friction is [low, high], 0 < low ≤ high",
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +92,7 @@ class Object:
         if isinstance(self.support, str):
             object.__setattr__(self, "support_word", self.support)
             object.__setattr__(self, "support", _support(self.outline, self.support))
-        if not (np.isfinite(self.friction) and self.friction >= 0):
+        if not (is_finite(self.friction) and self.friction >= 0):
             raise InputError(
                 "friction is a finite number, 0 or more", key="object.friction", value=self.friction
             )
@@ -144,8 +151,8 @@ class Pusher:
                 raise InputError(rule, key=f"pusher.{key}", value=getattr(self, key), hint=hint)
 
         for key in ("spacing", "tip_radius", "approach", "lift", *SPEEDS):
-            need(bool(np.isfinite(getattr(self, key))), key, "a finite number is needed")
-        need(self.fingers in (1, 2), "fingers", "a pusher has 1 or 2 fingers")
+            need(is_finite(getattr(self, key)), key, "a finite number is needed")
+        need(is_number(self.fingers) and self.fingers in (1, 2), "fingers", "a pusher has 1 or 2 fingers")
         need(self.tip_radius >= 0, "tip_radius", "a tip radius is 0 or more")
         for key in SPEEDS:
             need(
@@ -181,6 +188,12 @@ class Push:
     fingers: int = 1
     spacing: float = 0.0
 
+    def __post_init__(self) -> None:
+        if not (is_number(self.fingers) and self.fingers in (1, 2)):
+            raise InputError("a push has 1 or 2 fingers", key=self.name, value=self.fingers)
+        if not (is_finite(self.spacing) and self.spacing >= 0):
+            raise InputError("a spacing is a finite number, 0 or more", key=self.name, value=self.spacing)
+
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
@@ -203,7 +216,7 @@ class Workspace:
 
     def __post_init__(self) -> None:
         if self.bounds is not None:
-            sides = np.array(self.bounds, dtype=float)
+            sides = numbers(self.bounds, "the bounds are four numbers", "workspace.bounds")
             if sides.shape != (4,) or not np.all(np.isfinite(sides)) or np.any(sides[:2] >= sides[2:]):
                 raise InputError(
                     "the bounds enclose an area",
@@ -254,20 +267,29 @@ class Planning:
         need(self.proof in ("set", "nominal"), "proof", "a proof is for the set or for the nominal table")
         need(self.model in MODELS, "model", f"the model is one of {', '.join(MODELS)}")
         need(
-            0 <= self.friction_margin < 1,
+            is_finite(self.friction_margin) and 0 <= self.friction_margin < 1,
             "friction_margin",
             "the friction margin is at least 0 and less than 1",
         )
-        need(np.isfinite(self.clearance) and self.clearance >= 0, "clearance", "a clearance is 0 or more")
+        need(is_finite(self.clearance) and self.clearance >= 0, "clearance", "a clearance is 0 or more")
         need(
-            np.isfinite(self.switching) and self.switching >= 0,
+            is_finite(self.switching) and self.switching >= 0,
             "switch_cost",
             "a switching cost is 0 or more",
         )
-        need(self.time_limit > 0, "time_limit", "a time limit is positive")
-        need(self.iterations >= 1, "iterations", "there is at least one iteration")
         need(
-            len(self.goal_tolerance) == 3 and all(t > 0 and np.isfinite(t) for t in self.goal_tolerance),
+            isinstance(self.seed, int) and is_number(self.seed) and self.seed >= 0,
+            "seed",
+            "a seed is a whole number, 0 or more",
+        )
+        need(is_number(self.time_limit) and self.time_limit > 0, "time_limit", "a time limit is positive")
+        need(
+            is_number(self.iterations) and self.iterations >= 1,
+            "iterations",
+            "there is at least one iteration",
+        )
+        need(
+            len(self.goal_tolerance) == 3 and all(is_finite(t) and t > 0 for t in self.goal_tolerance),
             "goal_tolerance",
             "three positive numbers are needed",
         )
@@ -337,10 +359,8 @@ def _pose(value: ArrayLike, name: str) -> Array:
     """A pose; "free" for the angle of a goal becomes NaN."""
     parts = list(value) if isinstance(value, list | tuple | np.ndarray) else [value]
     free = name == "goal" and len(parts) == 3 and (parts[2] == "free" or _is_nan(parts[2]))
-    pose = np.array([*parts[:2], 0.0] if free else value, dtype=float)
-    if pose.shape != (3,) or not np.all(np.isfinite(pose)):
-        rule = "a pose is three finite numbers, [x, y, θ]" + (', or [x, y, "free"]' if name == "goal" else "")
-        raise InputError(rule, key=name, value=value)
+    rule = "a pose is three finite numbers, [x, y, θ]" + (', or [x, y, "free"]' if name == "goal" else "")
+    pose = vector([*parts[:2], 0.0] if free else value, 3, rule, name)
     if free:
         pose[2] = np.nan
     return pose

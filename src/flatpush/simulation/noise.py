@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import is_finite
 from ..errors import InputError
 from ..friction.draws import SurfaceDraws, draw_loads
 from ..friction.surface import LimitSurface
@@ -41,7 +42,7 @@ class Noise:
     def __post_init__(self) -> None:
         for name in ("position", "angle", "friction", "centre", "loads"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
+            if not (is_finite(value) and value >= 0):
                 raise InputError("noise is a finite number, 0 or more", key=name, value=value)
         if self.loads >= 1:
             raise InputError(
@@ -49,13 +50,13 @@ class Noise:
             )
         if self.friction_range is not None:
             low, high = self.friction_range
-            if not (np.isfinite(high) and 0 <= low <= high):
+            if not (is_finite(low) and is_finite(high) and 0 <= low <= high):
                 raise InputError(
                     "a range of friction is two numbers, 0 ≤ low ≤ high",
                     key="friction_range",
                     value=(low, high),
                 )
-        if self.df is not None and not (np.isfinite(self.df) and self.df >= 3):
+        if self.df is not None and not (is_finite(self.df) and self.df >= 3):
             raise InputError("a Wishart draw has at least 3 degrees of freedom", key="df", value=self.df)
 
 

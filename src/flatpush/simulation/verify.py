@@ -152,7 +152,8 @@ def _agree(a: Any, b: Any) -> bool:
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
         return len(a) == len(b) and all(_agree(x, y) for x, y in zip(a, b, strict=True))
     if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
-        return bool(abs(a - b) <= max(ABSOLUTE, RELATIVE * max(abs(a), abs(b))))
+        near = max(ABSOLUTE, RELATIVE * max(abs(a), abs(b)))
+        return bool(a == b or (math.isfinite(near) and abs(a - b) <= near))
     return bool(a == b)
 
 

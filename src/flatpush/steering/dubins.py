@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import is_number, numbers
 from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
 
@@ -114,9 +115,10 @@ def shortest_length(starts: ArrayLike, goals: ArrayLike, radius: float) -> Array
     """
     from .lengths import dubins_lengths
 
-    if np.ndim(starts) == np.ndim(goals) == 1:
-        return np.asarray(shortest_path(starts, goals, radius).length)
-    return dubins_lengths(starts, goals, radius)
+    X, Y = _shaped_poses(starts, "starts"), _shaped_poses(goals, "goals")
+    if X.ndim == Y.ndim == 1:
+        return np.asarray(shortest_path(X, Y, radius).length)
+    return dubins_lengths(X, Y, radius)
 
 
 def _shortest(start: Array, goal: Array, radius: float) -> tuple[str, tuple[float, float, float]]:
@@ -182,33 +184,10 @@ def _shaped_poses(values: ArrayLike, name: str) -> Array:
 
 
 def _checked_radius(radius: float) -> float:
-    if isinstance(radius, bool) or not np.isscalar(radius) or not isinstance(radius, (int, float, np.number)):
+    if not is_number(radius):
         raise InputError("the radius is a number", value=radius)
     if not RADII[0] <= radius <= RADII[1]:
         raise InputError(
             f"the radius is positive and finite [m], from {RADII[0]:g} to {RADII[1]:g}", value=radius
         )
     return float(radius)
-
-
-def numbers(values: ArrayLike, rule: str) -> Array:
-    """An array of numbers; strings and booleans are none.
-
-    Raises:
-        InputError: with the rule, for anything else.
-    """
-    try:
-        found = np.asarray(values)
-        mixed = found.dtype.kind in "iuf" and not isinstance(values, np.ndarray) and _has_truth(values)
-        if found.dtype.kind not in "iuf" or mixed:
-            raise TypeError(f"{found.dtype} is no number")
-        return found.astype(float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(rule, value=values) from error
-
-
-def _has_truth(values: object) -> bool:
-    """Whether True or False stands somewhere in nested sequences, where numpy makes a number of it."""
-    if isinstance(values, (list, tuple)):
-        return any(_has_truth(value) for value in values)
-    return isinstance(values, (bool, np.bool_))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import finite, is_finite, numbers
 from ..contact import PointContact, straight_force
 from ..errors import InputError, NoDubinsReduction
 from ..friction.ellipsoid import Ellipsoid
@@ -42,7 +43,7 @@ class FlatOutput:
 
         [Zhou2017] Eqs. 19, 20 and 30.
         """
-        return transform(pose, self.flat_point)
+        return transform(finite(pose, "poses are three finite numbers"), self.flat_point)
 
     def recover(self, z: ArrayLike, dz: ArrayLike, ddz: ArrayLike) -> tuple[Array, Array]:
         """Pose and force from the flat point's motion; all shapes (..., 2), broadcasting.
@@ -63,7 +64,7 @@ class FlatOutput:
         Raises:
             InputError: where the velocity is zero: the heading is undefined there.
         """
-        z, dz, ddz = (np.asarray(value, dtype=float) for value in (z, dz, ddz))
+        z, dz, ddz = (numbers(v, "z, dz and ddz are arrays of numbers") for v in (z, dz, ddz))
         for name, value in (("z", z), ("dz", dz), ("ddz", ddz)):
             if value.ndim == 0 or value.shape[-1] != 2 or not np.isfinite(value).all():
                 raise InputError(f"{name} is an array of finite numbers of shape (..., 2)", value=value)
@@ -118,7 +119,7 @@ def flat_output(contact: PointContact, ellipsoid: Ellipsoid, along: float | None
     >>> flat.flat_point.round(9).tolist(), round(flat.min_radius, 9)  # (0, ρ/r), ρ/(r μ)
     ([0.0, 0.02], 0.04)
     """
-    if along is not None and not np.isfinite(along):
+    if along is not None and not is_finite(along):
         raise InputError("along is a finite abscissa on the rotation-centre line [m]", value=along)
     A, p = ellipsoid.matrix, contact.point
     size = np.sqrt(

@@ -22,9 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import vector
 from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
-from .dubins import numbers
 
 TURN = 2 * math.pi
 TOLERANCE = (
@@ -190,7 +190,4 @@ def _checked_car(c_left: ArrayLike, c_right: ArrayLike, direction: ArrayLike) ->
 
 
 def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    vector = numbers(value, f"{name} is {size} numbers")
-    if vector.shape != (size,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} is {size} finite numbers", value=value)
-    return vector
+    return vector(value, size, f"{name} is {size} finite numbers")
