@@ -360,7 +360,7 @@ def _pose(value: ArrayLike, name: str) -> Array:
     parts = list(value) if isinstance(value, list | tuple | np.ndarray) else [value]
     free = name == "goal" and len(parts) == 3 and (parts[2] == "free" or _is_nan(parts[2]))
     rule = "a pose is three finite numbers, [x, y, θ]" + (', or [x, y, "free"]' if name == "goal" else "")
-    pose = vector([*parts[:2], 0.0] if free else value, 3, rule, name)
+    pose = vector(np.array([*parts[:2], 0.0]) if free else value, 3, rule, name)
     if free:
         pose[2] = np.nan
     return pose
