@@ -19,6 +19,9 @@ def command(
         int | None, typer.Option(help="How many runs, for those with random ones; default: their own.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of random runs.")] = None,
+    seeds: Annotated[
+        str | None, typer.Option(metavar="FIRST:END", help="Range of seeds, END not included, for push-t.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> int:
     """Run experiments NAMES and print their tables."""
@@ -28,7 +31,7 @@ def command(
         for name, about in EXPERIMENTS.items():
             typer.echo(f"{name:<12} {about}")
         return 0
-    ready = [experiment(name, data, runs, seed) for name in names]
+    ready = [experiment(name, data, runs, seed, seeds) for name in names]
     if figures is not None and not figures.is_dir():
         raise InputError("the folder for figures does not exist", source=str(figures))
     tables = {}

@@ -17,22 +17,30 @@ EXPERIMENTS = {
     "replay": "recorded runs of a robot through the simulator, calibrated and not (--data)",
     "crowded": "scenes full of obstacles, from a narrow passage to two hundred obstacles",
     "feedback": "random tasks of one finger under feedback, on another table than believed (--runs, --seed)",
+    "push-t": "the learners' benchmark of pushing without friction, solved by planning (--seeds)",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
 # Those that take a number of runs and a seed.
 RANDOM = {"feedback"}
+# Those that take a range of seeds.
+SEEDED = {"push-t"}
 # Those that need the folder of recorded data.
 RECORDED = {"force-pushes", "replay"}
 
 
 def experiment(
-    name: str, data: Path | None = None, runs: int | None = None, seed: int | None = None
+    name: str,
+    data: Path | None = None,
+    runs: int | None = None,
+    seed: int | None = None,
+    seeds: str | None = None,
 ) -> Callable[[Path | None], str]:
     """The experiment of a name: a function that takes a folder for figures, or None, and returns its table.
 
     Args:
         data: folder of the recorded data; default: that which the environment's FLATPUSH_DATA names.
         runs, seed: of an experiment with random runs; default: its own.
+        seeds: "FIRST:END" for those that go through many; END is not one of them.
 
     Raises:
         InputError: if there is no such experiment, it needs recorded data and they are not there, or runs or seed make
@@ -47,6 +55,10 @@ def experiment(
         raise InputError("there is at least one run", key="runs", value=runs)
     if seed is not None and seed < 0:
         raise InputError("a seed is 0 or more", key="seed", value=seed)
+    if seeds is not None and name not in SEEDED:
+        raise InputError(f"the experiment {name!r} takes no range of seeds", hint="Leave --seeds out.")
+    if name in SEEDED:
+        return run if seeds is None else partial(run, seeds=_range(seeds))
     if name in RANDOM:
         return partial(run, runs=runs, seed=seed)
     if runs is not None or seed is not None:
@@ -61,3 +73,12 @@ def experiment(
             hint="Name their folder with --data.",
         )
     return partial(run, data=Path(folder))
+
+
+def _range(text: str) -> tuple[int, int]:
+    first, _, end = text.partition(":")
+    if not (first.isdigit() and end.isdigit() and int(first) < int(end)):
+        raise InputError(
+            "seeds are FIRST:END, two whole numbers, the first less than the second", key="seeds", value=text
+        )
+    return int(first), int(end)

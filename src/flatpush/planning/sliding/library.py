@@ -1,0 +1,140 @@
+"""Straight pushes with one finger, rolled out once each, whatever the contact does: stick, slide, let go."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError
+from ...geometry import compose, transform
+from ...geometry.pose import Array, rotate
+from ...problem import Object
+from ...simulation.plant import Plant
+
+# By default: contacts a twentieth of the object's size apart, directions 15° apart, lengths that grow by half.
+CONTACTS = 0.04  # distance of neighbouring contacts, by the outline's size
+STEEPEST = np.deg2rad(60.0)  # angle between push and inward normal
+DIRECTIONS = 9
+LENGTHS = 0.02 * 1.5 ** np.arange(10)  # by the outline's size
+BEFORE = 0.01  # the finger starts so far from the contact, by the outline's size
+
+
+@dataclass(frozen=True, eq=False)
+class SlideLibrary:
+    """Straight pushes of one object; n of them. Frames: O of the object where the push begins.
+
+    Attributes:
+        edge, along: the contact, as Outline.at takes it, shapes (n,).
+        direction: angle from the inward normal to the push, counter-clockwise, shape (n,) [rad].
+        length: of the finger's way from the contact on, shape (n,) [m].
+        begin, end: the fingertip's centre before and after the push, in O at its beginning, shape (n, 2) [m].
+        displacement: pose of the object after the push in O at its beginning, shape (n, 3).
+        cof: centre of friction in O, shape (2,) [m].
+        reach: the outline's greatest distance from it [m]; with it angles are measured as lengths.
+    """
+
+    edge: NDArray[np.intp]
+    along: Array
+    direction: Array
+    length: Array
+    begin: Array
+    end: Array
+    displacement: Array
+    cof: Array
+    reach: float
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    def coordinates(self, poses: ArrayLike) -> Array:
+        """Poses (..., 3) as points (..., 4) whose distance is about the displacement of the outline's farthest point.
+
+        They are the place of the centre of friction and the direction of O's x axis, times the reach.
+        """
+        X = np.asarray(poses, dtype=float)
+        angle = X[..., 2:]
+        turned = self.reach * np.concatenate([np.cos(angle), np.sin(angle)], axis=-1)
+        return np.concatenate([transform(X, self.cof), turned], axis=-1)
+
+
+def slide_library(
+    thing: Object,
+    plant: Plant,
+    contacts: ArrayLike | None = None,
+    directions: ArrayLike | None = None,
+    lengths: ArrayLike | None = None,
+    before: float | None = None,
+) -> SlideLibrary:
+    """Rolls out straight pushes from all around an object, in the plant.
+
+    Pushes that could not begin, because the finger would start in the object, are left out.
+
+    Args:
+        plant: of the object and one finger at its hand's origin.
+        contacts: edges and places on them (m, 2), as Outline.at takes them; default: evenly around the outline.
+        directions: angles from the inward normal [rad]; default: nine within ±60°.
+        lengths: of the pushes from the contact on [m], increasing; default: ten from 2 to 77 % of the size.
+        before: the finger starts at least so far from the outline [m]; default: 1 % of the size.
+
+    Raises:
+        InputError: for another number of fingers, or no push that could begin.
+    """
+    if plant.fingers.shape != (1, 2) or np.any(plant.fingers):
+        raise InputError("sliding pushes are made with one finger, at its hand's origin", value=plant.fingers)
+    outline, tip = thing.outline, plant.tip_radius
+    places = _around(thing) if contacts is None else np.asarray(contacts, dtype=float)
+    angles = np.linspace(-STEEPEST, STEEPEST, DIRECTIONS) if directions is None else np.asarray(directions)
+    ways = LENGTHS * outline.size if lengths is None else np.asarray(lengths, dtype=float)
+    room = BEFORE * outline.size if before is None else before
+    rows, touching, headings, starts = [], [], [], []
+    for edge, along in places:
+        contact = outline.at(int(edge), float(along))
+        centre = contact.point - tip * contact.normal
+        for angle in angles:
+            heading = rotate(angle, contact.normal)
+            start = centre - room / np.cos(angle) * heading
+            if outline.nearest(start).distance >= tip + 0.5 * room:
+                rows.append((edge, along, angle))
+                touching.append(centre)
+                headings.append(heading)
+                starts.append(start)
+    if not rows:
+        raise InputError("no finger of this radius reaches the outline", value=tip)
+    touch, heading, begin = np.array(touching), np.array(headings), np.array(starts)
+    end = touch[:, None] + ways[:, None] * heading[:, None]  # (n, lengths, 2)
+    hand = np.zeros((len(rows), 2 + len(ways), 3))
+    hand[..., :2] = np.concatenate([begin[:, None], touch[:, None], end], axis=1)
+    hand[..., 2] = np.arctan2(heading[:, 1], heading[:, 0])[:, None]
+    runs = plant.many(np.zeros((len(rows), 3)), hand, push_out=False, record=True)
+    assert runs.object is not None
+    good = runs.outcome == 0
+    number = np.array(rows)[good].repeat(len(ways), axis=0)
+    return SlideLibrary(
+        number[:, 0].astype(np.intp),
+        number[:, 1],
+        number[:, 2],
+        np.tile(ways, int(good.sum())),
+        begin[good].repeat(len(ways), axis=0),
+        end[good].reshape(-1, 2),
+        runs.object[good][:, 2:].reshape(-1, 3),
+        np.array(plant.cof),
+        outline.radius_about(plant.cof),
+    )
+
+
+def _around(thing: Object) -> Array:
+    """Contacts evenly around the outline, at least two on each edge, shape (m, 2)."""
+    outline = thing.outline
+    if outline.is_circle:
+        count = int(np.ceil(2 * np.pi * outline.radius / (CONTACTS * outline.size)))
+        return np.stack([np.zeros(count), (np.arange(count) + 0.5) / count], axis=1)
+    ends = outline.edges
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    counts = np.maximum(2, np.round(lengths / (CONTACTS * outline.size)).astype(int))
+    return np.array([(e, (k + 0.5) / n) for e, n in enumerate(counts) for k in range(n)])
+
+
+def product(poses: ArrayLike, displacements: ArrayLike) -> Array:
+    """All products of poses (n, 3) and displacements (m, 3), shape (n · m, 3)."""
+    X, D = np.asarray(poses, dtype=float), np.asarray(displacements, dtype=float)
+    return compose(X[:, None], D[None]).reshape(-1, 3)
