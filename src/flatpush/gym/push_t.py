@@ -88,10 +88,10 @@ class PushTPolicy:
         self.agent = Agent(100.0, 20.0, 0.01, 10, ROOM)
         thing = tee()
         plant = Plant(thing, [[0.0, 0.0]], TIP, surface=thing.surface, cof=CENTRE_OF_GRAVITY)
-        self.library: SlideLibrary = slide_library(
+        self.slides: SlideLibrary = slide_library(
             thing, plant, directions=DIRECTIONS, lengths=LENGTHS, before=BEFORE
         )
-        self.search = SlideSearch(self.library)
+        self.search = SlideSearch(self.slides)
         side = np.linspace(0.0, ROOM, GRID)
         grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 1, 2)
         pairs = np.random.default_rng(0).uniform(0.0, ROOM, (AT_RANDOM, 2, 2))
@@ -150,7 +150,7 @@ class PushTPolicy:
                 break  # longer ones come later
             poses = [pose]
             for k in sequence.pushes:
-                poses.append(compose(poses[-1], self.library.displacement[k]))
+                poses.append(compose(poses[-1], self.slides.displacement[k]))
             if not all(map(_between_walls, poses[1:])) or (coverage and _coverage(poses[-1]) < coverage):
                 continue
             made = self._made(agent, pose, sequence, best)
@@ -162,7 +162,7 @@ class PushTPolicy:
 
     def _made(self, agent: Array, pose: Array, sequence: Sequence, below: float) -> tuple[int, Array] | None:
         """Control steps of a sequence and the commands of its first push, if it can be made in fewer than so many."""
-        library, steps, first = self.library, 0, None
+        library, steps, first = self.slides, 0, None
         for done, k in enumerate(sequence.pushes):
             begin, end = transform(pose, library.begin[k]), transform(pose, library.end[k])
             if not self.agent.allowed(np.stack([begin, end])):

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ...geometry import compose, inverse
 from ...geometry.pose import Array
-from .library import SlideLibrary, product
+from .slides import SlideLibrary, product
 
 Numbers = NDArray[np.intp]
 
@@ -43,7 +43,7 @@ class SlideSearch:
     """
 
     def __init__(self, library: SlideLibrary) -> None:
-        self.library = library
+        self.slides = library
         moves = library.displacement
         places = library.coordinates(moves)
         self._undone = inverse(moves)
@@ -64,7 +64,7 @@ class SlideSearch:
         Of each number of pushes the nearest are given, nearest first. Longer ones are sought only when the caller asks
         for more.
         """
-        X, at = np.asarray(goal, dtype=float), self.library.coordinates
+        X, at = np.asarray(goal, dtype=float), self.slides.coordinates
         misses, last = self._tree.query(at(X), k=20, distance_upper_bound=within)
         yield from (Sequence((int(j),), float(m)) for m, j in zip(misses, last, strict=True) if m < within)
         rest = at(compose(self._undone, X))
@@ -75,10 +75,10 @@ class SlideSearch:
 
     def approaches(self, goal: ArrayLike) -> Iterator[Sequence]:
         """Pairs of pushes, then single ones, that come nearest to a goal X_OG however far it is, nearest first."""
-        target = self.library.coordinates(goal)
-        moves = self.library.displacement
+        target = self.slides.coordinates(goal)
+        moves = self.slides.displacement
         for reached, pushes in ((self._pairs, self._doubles), (moves, self._singles)):
-            misses = np.linalg.norm(self.library.coordinates(reached) - target, axis=1)
+            misses = np.linalg.norm(self.slides.coordinates(reached) - target, axis=1)
             yield from _best(misses, pushes, FAR_KEPT)
 
 
