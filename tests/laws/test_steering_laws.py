@@ -9,7 +9,7 @@ from flatpush.geometry import compose, pose_error, relative
 from flatpush.steering import dubins, shortest_word, words
 from flatpush.steering.three_twist import WORDS, Word, end_pose
 
-CARS = 10_000
+CARS = 3_000
 COMPARED = 1_000
 END = 1e-9  # [m], [rad] for cars and distances of the order of a metre
 SAME = 1e-9

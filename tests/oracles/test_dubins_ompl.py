@@ -8,7 +8,7 @@ from flatpush.steering.dubins import DubinsPath, shortest_length, shortest_path
 base = pytest.importorskip("ompl.base", reason="OMPL is not installed")
 
 RANDOM_PAIRS = 100_000
-DEGENERATE_PAIRS = 10_000
+DEGENERATE_PAIRS = [2_000, pytest.param(10_000, marks=pytest.mark.slow)]
 PLAIN_PAIRS = 2_000
 RELATIVE = 1e-9  # rounding of both; a wrong word is off by far more
 FULL_TURN = 1e-6  # [radii] OMPL itself snaps arcs within 5e-7 of a turn
@@ -104,10 +104,11 @@ def check(start, goal, radius, ompl):
     assert abs(compiled - path.length) <= 1e-7 * radius + RELATIVE * path.length
 
 
-def test_degenerate_pairs_make_no_spurious_turn():
+@pytest.mark.parametrize("count", DEGENERATE_PAIRS)
+def test_degenerate_pairs_make_no_spurious_turn(count):
     rng = np.random.default_rng(7)
     ompl = Ompl()
-    for start, goal, radius in degenerate_pairs(rng, DEGENERATE_PAIRS):
+    for start, goal, radius in degenerate_pairs(rng, count):
         check(start, goal, radius, ompl)
 
 

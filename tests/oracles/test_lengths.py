@@ -241,6 +241,7 @@ def test_a_pose_that_is_not_finite_is_refused(value, place, which):
         dubins_lengths(np.zeros((2, 3)), np.zeros((4, 3)), 1.0)
 
 
+@pytest.mark.slow
 def test_the_loops_are_vectorised():
     """One branch or library call in a block would make the loops ten times slower and nothing else would tell."""
     import llvmlite.binding as llvm

@@ -43,7 +43,7 @@ def test_compiled_edges_keep_clear_where_their_displacements_do(query):
     rng = np.random.default_rng(1)
     T, fleet, drawn = query.arrays, query.fleet, np.zeros(1, WORD)
     decided = {True: 0, False: 0}
-    while sum(decided.values()) < 300:
+    while sum(decided.values()) < 100:
         a = int(rng.integers(fleet.size))
         start = rng.uniform([0, 0, -3], [0.32, 0.25, 3])
         if pose_clearance(query.world, query.bodies[a], start) < query.clearance:
@@ -55,7 +55,7 @@ def test_compiled_edges_keep_clear_where_their_displacements_do(query):
         gap = path_clearance(query.world, query.bodies[a], start, steps).distance
         decided[bool(word_clear(T, a, start, drawn, 0))] += 1
         assert word_clear(T, a, start, drawn, 0) == (gap >= query.clearance)
-    assert min(decided.values()) > 20
+    assert min(decided.values()) > 10
 
 
 def test_a_lattice_finds_the_maze_at_once_and_its_way_is_free(query):

@@ -161,7 +161,20 @@ def test_many_runs_are_the_single_runs(square):
             assert np.array_equal(runs.final[i], run.object[-1])
 
 
-@pytest.mark.parametrize("name", ["three feet", "ellipsoid"])
+def patient(monkeypatch, interpreted_steps):
+    """As in a new process that interprets so many steps before it compiles."""
+    monkeypatch.setattr(module, "PATIENCE", interpreted_steps)
+    monkeypatch.setattr(module, "_interpreted", {})
+    monkeypatch.setattr(module, "_ready", set())
+
+
+COMPILED_ANYWAY = ["three feet", "ellipsoid"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*COMPILED_ANYWAY, *(pytest.param(n, marks=pytest.mark.slow) for n in ("polygon", "disc", "quartic"))],
+)
 def test_a_first_run_is_every_later_run_to_the_last_bit(monkeypatch, name):
     """What is interpreted before the kernels are there and what they compute then are the same numbers."""
     thing = fp.Object(HOOK, friction=0.35)
@@ -169,8 +182,7 @@ def test_a_first_run_is_every_later_run_to_the_last_bit(monkeypatch, name):
     plant = Plant(thing, [[0.0, 0.009], [0.0, -0.009]], 0.0025, surface=surfaces()[name])
     runs = []
     for patience in (1e9, 0.0):
-        monkeypatch.setattr(module, "_patience", [patience])
-        monkeypatch.setattr(module, "_ready", set())
+        patient(monkeypatch, patience)
         runs.append(plant.follow([0, 0, 0], hand, body=True))
         assert bool(module._ready) == (patience == 0.0)
     assert np.array_equal(runs[0].object, runs[1].object)
@@ -190,8 +202,7 @@ def test_a_finger_in_a_hollow_is_not_watched_step_by_step(monkeypatch):
     taken = []
     real = steps._settle
     monkeypatch.setattr(steps, "_settle", lambda *args: (taken.append(args[2]), real(*args)))
-    monkeypatch.setattr(module, "_patience", [1e9])
-    monkeypatch.setattr(module, "_ready", set())
+    patient(monkeypatch, 1e9)
     way = np.array([[-24.35, -7.81, 0.0], [46.13, 63.13, 0.0]]) / 1000
     run = Plant(thing, [[0.0, 0.0]], 0.0025).follow([0, 0, 0], way)
     assert run.outcome == ""

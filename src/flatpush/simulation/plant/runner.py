@@ -38,9 +38,10 @@ from .plain import Fingers
 
 Codes = NDArray[np.integer]
 
-# Steps that this process may still interpret before it compiles the kernels (a step takes about a millisecond then,
-# compiling takes longer than all of them), and the kinds of surface for which it has.
-_patience = [3000.0]
+# Steps that this process interprets for a kind of surface before it compiles the kernels for it (a step takes about a
+# millisecond then, compiling takes longer than all of them), how many it has, and the kinds for which it has compiled.
+PATIENCE = 3000.0
+_interpreted: dict[type, float] = {}
 _ready: set[type] = set()
 
 
@@ -159,9 +160,10 @@ class Runner:
             known = all(map(compilable, task.surfaces))
             surfaces = [surface_arrays(s) for s in task.surfaces] if known else None
         if surfaces and n:
-            if type(surfaces[0]) not in _ready:
-                _patience[0] -= n * self._work(task.hands)
-            if type(surfaces[0]) in _ready or _patience[0] < 0:
+            kind = type(surfaces[0])
+            if kind not in _ready:
+                _interpreted[kind] = _interpreted.get(kind, 0.0) + n * self._work(task.hands)
+            if kind in _ready or _interpreted[kind] > PATIENCE:
                 self._compiled(task, surfaces, threads, done)
             else:
                 self._interpreted(task, surfaces, done)
