@@ -1,6 +1,9 @@
 """Formatting, lint, types, import layers, and documents that tell the truth: the same here and wherever tests run."""
 
 import ast
+import dataclasses
+import importlib
+import inspect
 import re
 import subprocess
 import sys
@@ -259,9 +262,10 @@ def silently(statement: ast.stmt, asserting: set[str]) -> set[str]:
 def silent_tests(text: str) -> list[str]:
     """Names of the tests in a file that can pass with nothing asserted; a helper that always asserts counts."""
     found = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
-    asserting = set(ASSERTING)
-    for _ in found:
-        asserting |= {node.name for node in found if not silent(node.body, asserting)}
+    asserting, more = set(ASSERTING), {""}
+    while more:
+        more = {node.name for node in found if not silent(node.body, asserting)} - asserting
+        asserting |= more
     return [node.name for node in found if node.name.startswith("test_") and node.name not in asserting]
 
 
@@ -274,6 +278,59 @@ def test_no_test_passes_with_nothing_asserted():
     assert not {
         (path.name, name) for path in files for name in silent_tests(path.read_text(encoding="utf-8"))
     }
+
+
+SAYS = re.compile(
+    r"\[[^\]]*\b(m|s|rad|deg|N|Hz|px)(?![a-z])[^\]]*\]|shape \(|\((n|m|k|\.\.\.|\d)[^)]*, ?[^)]*\)|X_[A-Z]{2}|0 to 1"
+    r"|[Hh]ow many|\b(shares?|bytes|fraction|ratio|factor|coefficients?|number|degrees of freedom|relative|weights?)\b"
+    r"|\bunit (normal|vector|direction|twist|wrench)|radians|in the unit of"
+)
+NUMERIC = re.compile(r"\b(float|int|Array|ArrayLike|NDArray|ndarray)\b")
+
+
+def entry(doc: str, name: str) -> str:
+    """What a docstring says of an attribute: its entry, or else the sentences that name it."""
+    found = re.search(
+        rf"(?:^|[.;] )\s*(?:\w+, )*{name}(?:, \w+)*: .*?(?=\n\s*(?:\w+, )*\w+: |\n\s*\n|\Z)", doc, re.S | re.M
+    )
+    return found[0] if found else " ".join(re.findall(rf"[^.]*\b{name}\b[^.]*", doc))
+
+
+def unsaid(module_name: str) -> Iterator[str]:
+    """Numbers in the public names of a module of which no docstring says shape, unit or meaning."""
+    module = importlib.import_module(module_name)
+    for name in module.__all__:
+        thing = getattr(module, name)
+        inherited = thing.__mro__[1:] if inspect.isclass(thing) else ()
+        members = {name: thing} if inspect.isfunction(thing) else {}
+        if inspect.isclass(thing):
+            members = {f"{name}.{k}": v for k, v in vars(thing).items() if not k.startswith("_")}
+            for field in dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ():
+                public = NUMERIC.search(str(field.type)) and not field.name.startswith("_")
+                if public and field.name in vars(thing).get("__annotations__", {}):
+                    docs = [inspect.getdoc(c) or "" for c in (thing, *inherited)]
+                    if not any(SAYS.search(entry(doc, field.name)) for doc in docs):
+                        yield f"{name}.{field.name}"
+        for full, member in members.items():
+            of = getattr(member, "__func__", None) or getattr(member, "fget", None) or member
+            if inspect.isfunction(of):
+                kin = [vars(c)[of.__name__] for c in inherited if of.__name__ in vars(c)]
+                doc = "\n".join(inspect.getdoc(one) or "" for one in (of, *kin))
+                hints = {k: str(v) for k, v in of.__annotations__.items() if NUMERIC.search(str(v))}
+                missing = [k for k in hints if k != "return" and not re.search(rf"\b{k}\b", doc)]
+                if missing or (hints and not SAYS.search(doc)):
+                    yield f"{full}({', '.join(missing)})"
+
+
+ROOMS = (
+    *("geometry", "geometry.collision", "friction", "contact", "steering", "problem", "documents"),
+    *("simulation", "planning", "control"),
+)
+
+
+@pytest.mark.parametrize("module", ["flatpush", *(f"flatpush.{room}" for room in ROOMS)])
+def test_public_names_say_shape_unit_or_meaning_of_their_numbers(module):
+    assert list(unsaid(module)) == []
 
 
 def test_any_does_not_spread():

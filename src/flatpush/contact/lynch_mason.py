@@ -48,7 +48,11 @@ class StableRegion:
         return np.asarray(np.all(c @ normals.T <= offsets, axis=-1))
 
     def polygon(self, sense: int, box: Sequence[float]) -> Array:
-        """The part of the region inside a box (xmin, ymin, xmax, ymax), corners (n, 2) in order."""
+        """The part of the region inside a box (xmin, ymin, xmax, ymax) [m], corners in order, shape (n, 2) [m].
+
+        Args:
+            sense: +1 for rotations counter-clockwise, -1 for those clockwise.
+        """
         half_planes = self.left if sense > 0 else self.right
         if half_planes is None:
             return np.empty((0, 2))

@@ -36,12 +36,12 @@ class Placement:
 
     @property
     def virtual_point(self) -> Array:
-        """The contact point, or the midpoint of two ([Zhou2017] Sec. 4.2)."""
+        """The contact point in O, or the midpoint of two ([Zhou2017] Sec. 4.2), shape (2,) [m]."""
         return self.points.mean(axis=0)
 
     @property
     def virtual_normal(self) -> Array:
-        """The inward normal, or the average of two."""
+        """The inward normal in O, or the average of two, a unit vector (2,)."""
         n = self.normals.mean(axis=0)
         return n / np.hypot(*n)
 
@@ -53,6 +53,9 @@ def place_fingers(
 
     Two fingers straddle the inward normal at the point; the hand is advanced along its push direction and turned until
     both tips touch, so that it also fits into concave sides.
+
+    Args:
+        fingers: how many, 1 or 2. spacing: between the centres of two fingertips [m]. tip_radius: [m].
 
     Raises:
         InputError: if a tip would overlap the outline, rest on a sharp corner, or not touch at all.

@@ -46,7 +46,7 @@ class WrenchCone:
 
     @classmethod
     def spanned(cls, wrenches: ArrayLike, lever: float) -> "WrenchCone":
-        """The cone of given wrenches, shape (n, 3)."""
+        """The cone of given wrenches, shape (n, 3), with the unit of length `lever` [m] for torques."""
         rays = np.asarray(wrenches, dtype=float) / [1.0, 1.0, lever]
         rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return cls(rays, _faces(rays), lever)
@@ -69,7 +69,7 @@ class WrenchCone:
         return np.min(F @ self.faces.T, axis=-1) / np.where(size > 0, size, 1.0)
 
     def depths(self, wrenches: WrenchSet) -> tuple[float, float]:
-        """The least and the greatest depth among all the wrenches of one twist, in parts of the middle one's size.
+        """The least and the greatest depth among all the wrenches of one twist, as shares of the middle one's size.
 
         The greatest is at least 0 when the twist sticks ("some wrench lies in the cone"); the least is, when it does so
         whatever the support point under the rotation centre does.
@@ -90,7 +90,7 @@ class WrenchCone:
         return least / size, greatest / size
 
     def order(self) -> Array:
-        """Indices of the rays that are edges of the cone, counter-clockwise about its axis.
+        """Numbers, shape (k,), of the rays that are edges of the cone, counter-clockwise about its axis.
 
         Raises:
             InputError: if the cone holds a wrench and its opposite (fingers that squeeze), or lies in a plane.
@@ -126,7 +126,7 @@ class WrenchCone:
 
 
 def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:
-    """The composite cone of two contacts less a friction margin, in [0, 1).
+    """The composite cone of two contacts less a friction margin, a share in [0, 1).
 
     It is that of contacts with (1 - margin) μ, each finger's force shared with the other, 1 - margin/2 to margin/2: the
     lighter finger keeps margin/2 of the load at least. Under parallel normals that is the cone of two contacts that

@@ -32,7 +32,7 @@ class BadRow:
     """A row that cannot be used.
 
     Attributes:
-        line: of the file, counted from 1.
+        line: its number in the file, counted from 1.
         reason: what is wrong.
     """
 

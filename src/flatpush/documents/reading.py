@@ -34,7 +34,7 @@ def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[s
     """The document in a YAML or JSON file, as plain values in the file's own units, not checked further.
 
     A file named .json is read as JSON, one named .yaml or .yml as YAML; of others, one that begins with a
-    brace is JSON. Numbers and words are those of YAML 1.2.
+    brace is JSON. Numbers and words are those of YAML 1.2. A file has at most `most` bytes.
 
     Raises:
         InputError: if the file cannot be read, is empty, binary, cut off or too large, holds a key twice, or

@@ -26,7 +26,7 @@ class Ellipsoid(LimitSurface):
     [0.0, 0.0, 0.5]
 
     Attributes:
-        matrix: A; in SI its last row and column carry 1/m and 1/m².
+        matrix: A, shape (3, 3); with forces in N [1/N²], its last row and column also 1/m, and 1/m² where they meet.
         fit: how well it fits, if it was fitted.
 
     Raises:

@@ -86,7 +86,11 @@ def fit_quartic(
     """The convex quartic that explains pairs of wrench and twist best, proved convex by its Gram matrix.
 
     The program of fit_ellipsoid with the 15 coefficients in the place of A, ∇H in the place of A F and the
-    Gram matrix of the Hessian positive semidefinite; n ≥ 15. See there for the arguments.
+    Gram matrix of the Hessian positive semidefinite.
+
+    Args:
+        wrenches, twists: shape (n, 3), n ≥ 15; the rest as there: length [m], force [N], and the weights
+            regularisation, force_weight and velocity_weight, numbers without unit.
     """
     data = _Pairs(wrenches, twists, length, force, needed=15)
     F = data.wrenches
@@ -118,7 +122,8 @@ def fit_surface(
     Args:
         surface: a support (taken about its centre, with its exact surface) or any limit surface.
         kind: "ellipsoid" or "quartic".
-        length: default: the gyration radius of a support; of another surface, torque over force it resists.
+        length: characteristic length [m]; default: the gyration radius of a support; of another surface, torque over
+            force it resists.
         regularisation: λ; the data have no noise.
     """
     if kind not in ("ellipsoid", "quartic"):

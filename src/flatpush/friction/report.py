@@ -23,6 +23,7 @@ class FitReport:
 
     @property
     def n(self) -> int:
+        """How many pairs there are."""
         return len(self.angles)
 
     @property

@@ -100,12 +100,12 @@ class Support:
 
     @classmethod
     def disc(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Support":
-        """Uniform pressure over a disc [m]."""
+        """Uniform pressure over a disc: radius [m], centre, shape (2,) [m]."""
         return cls._round(radius, centre, filled=True)
 
     @classmethod
     def ring(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Support":
-        """Uniform pressure along a circle [m]."""
+        """Uniform pressure along a circle: radius [m], centre, shape (2,) [m]."""
         return cls._round(radius, centre, filled=False)
 
     @property

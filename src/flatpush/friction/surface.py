@@ -14,11 +14,16 @@ class WrenchSet:
     """All wrenches of one twist: {centre + J_pᵀ g : |g| ≤ radius}, with J_pᵀ g the wrench of a force g at p.
 
     The radius is zero, and the set one wrench, unless the twist is a rotation about a support point p.
+
+    Attributes:
+        centre: the wrench in the middle of the set (fx, fy, τ), shape (3,), in the unit of the surface.
+        point: the support point p, shape (2,) [m]; zeros where the radius is 0.
+        radius: the largest free force of that point, in the unit of the surface.
     """
 
-    centre: Array  # (3,)
-    point: Array  # (2,) the support point p; zeros where the radius is 0
-    radius: float  # the largest free force of that point
+    centre: Array
+    point: Array
+    radius: float
 
 
 class LimitSurface(ABC):

@@ -46,11 +46,16 @@ class Outline:
     >>> square = Outline.polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
     >>> square.area, square.centroid.tolist(), square.nearest((-0.5, 1.0)).normal.tolist()
     (4.0, [1.0, 1.0], [1.0, 0.0])
+
+    Attributes:
+        vertices: corners of the polygon in the frame it was drawn in, shape (n, 2) [m]; none for a circle.
+        centre: of the circle in that frame, shape (2,) [m].
+        radius: of the circle [m]; 0 for a polygon.
     """
 
-    vertices: Array  # (n, 2); empty for a circle
-    centre: Array  # (2,); of the circle
-    radius: float  # of the circle; 0 for a polygon
+    vertices: Array
+    centre: Array
+    radius: float
 
     @classmethod
     def polygon(cls, vertices: ArrayLike) -> "Outline":
@@ -196,7 +201,7 @@ class Outline:
         return float(np.max(np.linalg.norm(self.vertices - p, axis=1)))
 
     def at(self, edge: int, along: float) -> OutlinePoint:
-        """The point at a place on an edge (polygon), or at the angle 2π · along (circle)."""
+        """The point at a place, 0 to 1, on an edge of a number (polygon), or at the angle 2π · along (circle)."""
         if not is_finite(along):
             raise InputError("a place along an edge is a finite number", value=along)
         if self.is_circle:

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def wrap_angle(angle: ArrayLike) -> Array:
-    """The same angle in (-π, π].
+    """The same angle in (-π, π] [rad].
 
     >>> float(wrap_angle(3 * np.pi)) == np.pi
     True
@@ -27,7 +27,7 @@ def cross(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def perpendicular(vector: ArrayLike) -> Array:
-    """The plane vector turned by +90° (to its left)."""
+    """Plane vectors, shape (..., 2), turned by +90° (to their left)."""
     v = np.asarray(vector, dtype=float)
     return np.stack([-v[..., 1], v[..., 0]], axis=-1)
 
@@ -64,7 +64,7 @@ def relative(X_WA: ArrayLike, X_WB: ArrayLike) -> Array:
 
 
 def exp(twist: ArrayLike) -> Array:
-    """The displacement after unit time with a constant body twist; exact for every ω, zero included.
+    """The displacement after unit time with a constant body twist, both (..., 3); exact for every ω, zero included.
 
     >>> exp([0.0, 1.0, 0.0]).tolist()
     [0.0, 1.0, 0.0]
@@ -105,7 +105,10 @@ def velocity_at(twist: ArrayLike, points: ArrayLike) -> Array:
 
 
 def shift_twist(twist: ArrayLike, point: ArrayLike) -> Array:
-    """The same motion as a twist about another point of the body: (velocity of that point, ω). Axes stay parallel."""
+    """The same motion as a twist (..., 3) about another point (..., 2) of the body: (velocity of that point, ω).
+
+    Axes stay parallel.
+    """
     V = np.asarray(twist, dtype=float)
     v = velocity_at(V, point)
     w = np.broadcast_to(V[..., 2:], (*v.shape[:-1], 1))
@@ -113,6 +116,6 @@ def shift_twist(twist: ArrayLike, point: ArrayLike) -> Array:
 
 
 def pose_error(pose: ArrayLike, target: ArrayLike) -> Array:
-    """pose - target, with the angle wrapped."""
+    """pose - target, both (..., 3), with the angle wrapped [m, m, rad]."""
     difference = np.asarray(pose, dtype=float) - np.asarray(target, dtype=float)
     return np.concatenate([difference[..., :2], wrap_angle(difference[..., 2:])], axis=-1)

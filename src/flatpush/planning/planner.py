@@ -142,6 +142,7 @@ class Planner:
 
     @property
     def explored(self) -> Array | None:
+        """Paths of the COF along edges of the search tree, shape (m, samples, 2) [m]; None without obstacles."""
         return None if self._among is None else self._among.explored
 
     def _candidates(self, scene: Scene) -> Iterator[Found]:

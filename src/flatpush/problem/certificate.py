@@ -28,7 +28,7 @@ class Certificate:
 
     Attributes:
         goal_error: final pose less the goal (x, y, θ) by integrating the arcs' twists [m, m, rad].
-        cost: recomputed, in the unit of the plan's cost: m, or s for the cost "time".
+        cost: recomputed, in the unit of the plan's cost [m, or s for the cost "time"].
         duration: of all segments [s].
         friction_margin: worst over all twists, and over all forces consistent with each: the fraction of μ that can
             be lost before the contact slips, under the planning model (two fingers in the middle: the virtual
@@ -49,7 +49,8 @@ class Certificate:
         model_offset: how far the believed surface's line of force passes from the contact, at worst [m]: 0 when the
             planning model is exact; None where two fingers use their cone.
         set_margin: two fingers, where the object states an uncertainty: the least depth in their composite cone of all
-            wrenches of all tables of that set (a sine; see contact.table_set). Proved where it is not negative.
+            wrenches of all tables of that set (a sine, so a number without unit; see contact.table_set). Proved
+            where it is not negative.
         set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
             offset of that set.
         growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.

@@ -18,9 +18,10 @@ class Arc:
 
     Attributes:
         turn: left (counter-clockwise), straight or right.
-        twist: body twist in O at O's origin, averaged over the arc: exp(duration · twist) is its displacement.
-        duration: [s], with the time law's stops.
-        cost: in the unit of the plan's cost.
+        twist: body twist in O at O's origin (vx, vy, ω), shape (3,) [m/s, m/s, rad/s], averaged over the arc:
+            exp(duration · twist) is its displacement.
+        duration: with the time law's stops [s].
+        cost: in the unit of the plan's cost [m or s].
     """
 
     turn: Literal["left", "straight", "right"]
@@ -37,10 +38,10 @@ class PushSegment:
         push: name of the push.
         word: such as "LSR".
         arcs: in order; those of no length are left out.
-        times: [s], from 0, shape (n,).
-        object: poses X_WO, shape (n, 3).
-        pusher: poses X_WE, shape (n, 3).
-        fingers: fingertip centres in E, shape (1 or 2, 2).
+        times: from 0, shape (n,) [s].
+        object: poses X_WO, shape (n, 3) [m, m, rad].
+        pusher: poses X_WE, shape (n, 3) [m, m, rad].
+        fingers: fingertip centres in E, shape (1 or 2, 2) [m].
     """
 
     push: str
@@ -55,7 +56,13 @@ class PushSegment:
 
 @dataclass(frozen=True, eq=False)
 class TransitSegment:
-    """The pusher alone: times (n,), poses X_WE (n, 3), heights above the table (n,), 0 being on it."""
+    """The pusher alone.
+
+    Attributes:
+        times: from 0, shape (n,) [s].
+        pusher: poses X_WE, shape (n, 3) [m, m, rad].
+        height: above the table, 0 being on it, shape (n,) [m].
+    """
 
     times: Array
     pusher: Array
@@ -70,13 +77,13 @@ class Plan:
     Attributes:
         status: "solved" or "no_plan".
         scene: the scene as resolved: the pushes listed, every default filled in.
-        cost: in the unit of scene.planning.cost; nan without a plan.
+        cost: [m], or [s] where scene.planning.cost is "time"; nan without a plan.
         duration: [s].
         segments: pushes and transits in order; empty when start and goal are equal.
         certificate: what was proved or measured; None without a plan.
         reason: why there is no plan, and what to try.
         scene_digest: of the scene it was saved with, see documents.scene_digest; empty before that and in older plans.
-        run: version and planning time; not part of what two plans are compared by.
+        run: version and planning time [s]; not part of what two plans are compared by.
     """
 
     status: Literal["solved", "no_plan"]
@@ -113,16 +120,16 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What the simulator saw; attributes as below, times from the start of the plan.
+    """What the simulator saw.
 
     Attributes:
         final_pose: X_WO at the end, shape (3,).
-        times: [s], shape (n,).
-        object, pusher: poses X_WO and X_WE, shape (n, 3).
+        times: from the start of the plan, shape (n,) [s].
+        object, pusher: poses X_WO and X_WE, shape (n, 3) [m, m, rad].
         modes: contact mode of each sample ("sticking", "sliding_left", …; "rest" in a transit).
         outcome: "completed", "passed a corner", "lost contact" (no finger touches at the end of a push), or why the
             simulation stopped: "jammed", "grasped".
-        seed: of the perturbation; None for the nominal run.
+        seed: number that the perturbation was drawn from; None for the nominal run.
     """
 
     final_pose: Array

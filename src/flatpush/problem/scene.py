@@ -128,8 +128,17 @@ SPEEDS = ("speed", "acceleration", "turn_rate", "travel_speed", "travel_accelera
 class Pusher:
     """The fingers and how they may move.
 
-    Lengths [m]; speed [m/s] and acceleration [m/s²] of the fastest fingertip on the table, travel_speed and
-    travel_acceleration while it is lifted; turn_rate [rad/s] of the hand, always.
+    Attributes:
+        fingers: how many, 1 or 2.
+        spacing: between the centres of two fingertips [m].
+        tip_radius: of a fingertip [m].
+        speed, acceleration: of the fastest fingertip on the table, at most [m/s], [m/s²].
+        approach: distance from the contact at which the pusher lands and leaves [m].
+        turns: whether the hand turns; if not, one finger keeps its orientation and rolls.
+        transit: how it goes from push to push.
+        lift: height of a lifted transit [m].
+        turn_rate: of the hand, at most, always [rad/s].
+        travel_speed, travel_acceleration: while it is lifted, at most [m/s], [m/s²].
     """
 
     fingers: int = 1
@@ -180,7 +189,8 @@ class Push:
     Attributes:
         name: for people, and in plans.
         at: the point of the outline, in O.
-        fingers, spacing: of this push [m].
+        fingers: how many push there, 1 or 2.
+        spacing: between the centres of two fingertips [m].
     """
 
     name: str
@@ -237,12 +247,27 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Planning:
-    """How to plan; the defaults are those of the scene document, in SI."""
+    """How to plan; the defaults are those of the scene document, in SI.
+
+    Attributes:
+        model: of the limit surface: exact, or what is fitted to it.
+        two_finger: the true composite cone of both contacts, or one virtual contact in their middle.
+        cost: what is made small: the path of the flat point or of the pusher [m], or the time [s].
+        switch_cost: of a change of contact, in the unit of the cost [m or s]; None: 0.03 m for flat, else 0.
+        friction_margin: the share of the friction, and of the spacing, that may be missing, in [0, 1).
+        clearance: of object and fingers from obstacles and bounds, at least [m].
+        goal_tolerance: in x, y and angle [m, m, rad].
+        robust: whether the cost after small errors of the switch poses is made small instead.
+        seed: of the random search, a number from 0.
+        iterations: how many the search makes at most.
+        time_limit: after which the search is cut short [s].
+        proof: of two fingers, where the object has an uncertainty.
+    """
 
     model: Model = "exact"
     two_finger: Literal["cone", "middle"] = "cone"
     cost: Cost = "flat"
-    switch_cost: float | None = None  # None: 0.03 m for flat, 0 for pusher and time
+    switch_cost: float | None = None
     friction_margin: float = 0.2
     clearance: float = 0.0
     goal_tolerance: tuple[float, float, float] = (0.0005, 0.0005, float(np.deg2rad(0.5)))
@@ -250,11 +275,11 @@ class Planning:
     seed: int = 0
     iterations: int = 10000
     time_limit: float = 5.0
-    proof: Literal["set", "nominal"] = "set"  # of two fingers, where the object has an uncertainty
+    proof: Literal["set", "nominal"] = "set"
 
     @property
     def switching(self) -> float:
-        """The switching cost that applies, in the unit of the cost."""
+        """The switching cost that applies, in the unit of the cost [m or s]."""
         if self.switch_cost is not None:
             return self.switch_cost
         return 0.03 if self.cost == "flat" else 0.0
@@ -334,6 +359,7 @@ class Scene:
 
     @property
     def start_pose(self) -> Array:
+        """X_WO, shape (3,) [m, m, rad]."""
         return np.asarray(self.start, dtype=float)
 
     @property

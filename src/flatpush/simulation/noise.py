@@ -25,7 +25,7 @@ class Noise:
         friction_range: the coefficient is uniform between these two instead.
         df: degrees of freedom of a Wishart draw of the limit surface, an ellipsoid or a quartic; None: as modelled.
         centre: of friction, standard deviation of each axis [m].
-        loads: of the feet, each uniform within 1 ± this part of its nominal value.
+        loads: of the feet, each uniform within 1 ± this share of its nominal value.
 
     Raises:
         InputError: for what is negative or not finite.

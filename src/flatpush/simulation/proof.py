@@ -24,7 +24,8 @@ class Proof:
 
     Attributes:
         proved: whether they do.
-        margin: the least depth in the fingers' composite cone (see WrenchCone.depth), over all motions and tables.
+        margin: the least depth in the fingers' composite cone over all motions and tables, a number without unit (see
+            WrenchCone.depth).
         loads: the largest share by which loads may differ at every point so that the plan still holds, with the same
             friction and offset; 0 where it does not hold for the nominal loads.
         push, arc: name of the push and number of its arc where the margin is least.

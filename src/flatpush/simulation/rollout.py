@@ -34,7 +34,7 @@ def simulate(
     (simulation.plant). Where it lands on the object, the object is moved aside first.
 
     Args:
-        seed: of the draw.
+        seed: number that is drawn from.
         model: limit surface under which the object moves; "exact" is the support's own, or the known one.
         perturbation: what is drawn; without one the run is the nominal one.
         source: the pusher's way: the plan's "arcs" exactly, or straight between its "samples".

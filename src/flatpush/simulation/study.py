@@ -39,7 +39,8 @@ class Runs:
 
     Attributes:
         plan: the plan.
-        seed: of all draws; run k draws from the stream (seed, k), however many runs there are and wherever they run.
+        seed: number behind all draws; run k draws from the stream (seed, k), however many runs there are and wherever
+            they run.
         noise: how much was drawn.
         starts: X_WO where each run began, shape (n, 3).
         frictions: coefficients between finger and object, shape (n,).
@@ -79,6 +80,7 @@ class Runs:
 
     @property
     def sticking_share(self) -> float:
+        """The share of runs in which nothing slid, 0 to 1."""
         return float(np.mean(self.sticking))
 
     @property

@@ -22,9 +22,9 @@ class FlatOutput:
         min_radius: the tightest turn that the flat point can follow to both sides [m].
         heading_offset: angle from that frame's +x to the heading of the flat point [rad].
         c_left: where on the rotation-centre line the object turns under the force on the left edge of the friction
-            cone: the centre of the *right* turn. From the foot of the COF's perpendicular, + to the right of
-            the heading; usually positive [m].
-        c_right: the same for the right edge: the centre of the left turn, less than c_left.
+            cone, the centre of the *right* turn [m]; usually positive. From the foot of the COF's perpendicular, + to
+            the right of the heading.
+        c_right: the same for the right edge: the centre of the left turn, less than c_left [m].
         along: the flat point, on the same line [m].
         contact, ellipsoid: of the push.
     """

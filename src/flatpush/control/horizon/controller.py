@@ -58,7 +58,7 @@ class HorizonController(AbstractController[HorizonState]):
         scene: with one finger, and the reserve as friction margin.
         rate: of the ticks [Hz].
         tolerance: it arrives within this distance [m] and angle [rad] of the goal.
-        landings: at most so many, then it gives up and says how far off it is.
+        landings: their number is at most this, then it gives up and says how far off it is.
         learn: whether the steering is learned while the finger sticks.
         body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
@@ -109,7 +109,9 @@ class HorizonController(AbstractController[HorizonState]):
 
         Args:
             plan: a plan, or its scene; its own way does not matter, since it is planned anew from what is seen.
-            latency: of the camera that is expected [s]; frames older than this and half a second stop the pusher.
+            latency: of the camera that is expected [s]; frames older than this and half a second, or than `stale` [s],
+                stop the pusher.
+            rate, tolerance, landings, body: see the attributes.
 
         Raises:
             InputError: for two fingers, obstacles or bounds (replanning does not see them), or no push that steers.
@@ -397,6 +399,6 @@ class HorizonController(AbstractController[HorizonState]):
         return self._go(replace(state, phase="retreat", stops=(stop,), note=why, window=window), time)
 
     def hand(self, state: HorizonState, time: float) -> Array:
-        """X_WE now: where the newest frame's log has it, and the commands since."""
+        """X_WE at a `time` [s]: where the newest frame's log has it, and the commands since."""
         assert state.seen.frame is not None
         return hand(state.seen.frame, state.seen.told, time)

@@ -53,7 +53,7 @@ class Gains:
         return cls(w * w, 2 * z * w)
 
     def check(self, rate: float, hold: Hold = "ramp") -> None:
-        """Refuses a rate that makes no sense, or at which these gains are not stable.
+        """Refuses a rate [Hz] that makes no sense, or at which these gains are not stable.
 
         The errors at the ticks obey λ² - tλ + d = 0, stable while |d| < 1 and |t| < 1 + d (Jury); with Δ = 1/rate that
         is k_p Δ/2 < k_d < 2/Δ on a ramp, k_p Δ < k_d < 2/Δ + k_p Δ/2 updating after, and 0 < k_d < 2/Δ - k_p Δ/2

@@ -116,6 +116,7 @@ class PathController(AbstractPushController[PathState]):
 
     @property
     def gains(self) -> tuple[float, float]:
+        """Stiffness [1/m²] and damping [1/m] of the law, its own or those that path_gains finds."""
         k1, k2 = path_gains(self.model)
         return (
             k1 if self.stiffness is None else float(self.stiffness),

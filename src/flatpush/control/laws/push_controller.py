@@ -26,7 +26,7 @@ class AbstractPushController(AbstractController[PushStateT]):
 
     @abstractmethod
     def follow(self, state: PushStateT, pose: Array, time: float) -> tuple[PushStateT, Command]:
-        """The state after a tick, and the command, for an object at X_WO now."""
+        """The state after a tick that begins at `time` [s], and the command, for an object at a pose X_WO now."""
 
     def act(self, state: PushStateT, time: float) -> tuple[PushStateT, Command]:
         assert state.seen.frame is not None

@@ -117,10 +117,12 @@ class PathReference(AbstractReference):
 
     @property
     def length(self) -> float:
+        """Of the flat path [m]."""
         return float(self.table[-1, 0] + self.table[-1, 1])
 
     @property
     def duration(self) -> float:  # type: ignore[override]
+        """From start to end [s]."""
         return sum(law.duration for law in self.laws) if self.laws else self.length / self.speed
 
     def at(self, time: float) -> FlatState:
@@ -130,7 +132,7 @@ class PathReference(AbstractReference):
         return FlatState(np.array([x, y]), v * t, a * t + v**2 * bend * perpendicular(t))
 
     def run(self, time: float) -> tuple[float, float, float]:
-        """Arc length, flat speed and its rate at a time."""
+        """Arc length [m], flat speed [m/s] and its rate [m/s²] at a time [s]."""
         if not self.laws:
             return self.speed * time, self.speed, 0.0
         k = 0
@@ -141,7 +143,8 @@ class PathReference(AbstractReference):
         return float(self.table[k, 0]) + length, speed, rate
 
     def speed_from(self, length: float, dt: float) -> float:
-        """Mean flat speed that the time law asks for in a tick that begins at an arc length; never 0 before the end."""
+        """Mean flat speed [m/s] of the time law in a tick of dt [s] that begins at an arc length [m]; never 0 before
+        its end."""
         if not self.laws:
             return self.speed
         k = int(np.clip(np.searchsorted(self.table[:, 0], length, side="right") - 1, 0, len(self.laws) - 1))
@@ -149,7 +152,7 @@ class PathReference(AbstractReference):
 
     @classmethod
     def straight(cls, start: ArrayLike, angle: float, length: float, speed: float) -> "PathReference":
-        """A line from a point of the flat point (2,), in a direction [rad]."""
+        """A line of a length [m] from `start`, a flat point (2,) [m], at an angle [rad] and a speed [m/s]."""
         x, y = np.asarray(start, dtype=float)
         return cls(np.array([[0.0, length, x, y, angle, 0.0]]), speed)
 

@@ -156,7 +156,8 @@ class SteeringModel:
         return float(h[0]), float(h[1]), float(r[0]), float(r[1]), float(z[0]), float(z[1])
 
     def motion(self, ux: float, uy: float) -> tuple[float, float]:
-        """Flat speed and ω of the object under a velocity in O of the pusher (where it turns) or contact."""
+        """Flat speed [m/s] and ω [rad/s] of the object under a velocity (ux, uy) in O [m/s] of the pusher (where it
+        turns) or the contact."""
         hx, hy, rx, ry, _, _ = self._numbers
         across = 0.0
         for _ in range(1 if self.drift is None else 3):
@@ -167,7 +168,8 @@ class SteeringModel:
     def moved(
         self, x: float, y: float, turn: float, ux: float, uy: float, dt: float
     ) -> tuple[float, float, float]:
-        """X_WO after a time in which the pusher goes straight with a velocity in W and the contact sticks."""
+        """X_WO, from (x, y, turn), after a time dt [s] in which the pusher goes straight with a velocity (ux, uy) in W
+        [m/s] and the contact sticks."""
         hx, hy, _, _, zx, zy = self._numbers
         middle, speed, omega = turn, 0.0, 0.0
         for _ in range(2):  # the second time with the heading of the middle of the stretch
@@ -187,7 +189,7 @@ class SteeringModel:
         return x + px - c * zx + d * zy, y + py - d * zx - c * zy, turn
 
     def across(self, speed: float, omega: float) -> float:
-        """Speed of the flat point to its left, of a flat speed and ω [m/s]; see drift."""
+        """Speed of the flat point to its left [m/s], of a flat speed [m/s] and omega [rad/s]; see drift."""
         d = self._drifts
         if not d or speed <= 0:
             return 0.0
@@ -198,7 +200,7 @@ class SteeringModel:
         return speed * (d[k] + (place - k) * (d[k + 1] - d[k]))
 
     def twist(self, speed: float, omega: float) -> Array:
-        """Body twist in O for a flat speed and ω, shape (3,)."""
+        """Body twist in O, shape (3,), for a flat speed [m/s] and omega [rad/s]."""
         h = self.direction
         v = speed * h + self.across(speed, omega) * perpendicular(h)
         return np.array([*(v - omega * perpendicular(self.flat_point)), omega])

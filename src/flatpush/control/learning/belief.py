@@ -127,7 +127,7 @@ class SteeringBelief:
         places: what was seen at each contact, see Place.
         information: of the prior, on (c_x, c_y, m), shape (3, 3).
         before: the prior's mean (c_x, c_y, m), shape (3,).
-        count: stretches seen.
+        count: number of stretches seen.
 
     >>> belief = SteeringBelief.prior(cof=[0, 0], rho=3e-4, sd_cof=1e-3, sd_rho=6e-5)
     >>> seen = belief.observed([-0.02, 0], [0.01, 0.0005, 0.03], np.diag([1e-8, 1e-8, 1e-6]))

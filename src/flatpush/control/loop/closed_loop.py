@@ -64,7 +64,7 @@ class ClosedLoopRun:
             of each tick, shape (n,) [m].
         modes: of the controller in each tick. contacts: of the first finger in the plant.
         outcome: the controller's, or "out of time …" with what it was doing, or why the plant stopped.
-        notes: what the controller said, each once, with the time when it first did.
+        notes: what the controller said, each once, with the time when it first did [s].
     """
 
     times: Array

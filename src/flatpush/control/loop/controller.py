@@ -67,7 +67,8 @@ class AbstractController(ABC, Generic[StateT]):
 
     @abstractmethod
     def act(self, state: StateT, time: float) -> tuple[StateT, Command]:
-        """The state after a tick and what the pusher should do, from frames that are good and young; see `step`."""
+        """The state after a tick that begins at `time` [s], and what the pusher should do, from frames that are good
+        and young; see `step`."""
 
     def noticed(self, state: StateT, frame: Measurement) -> StateT:
         """The state after a good frame has come; it is in state.seen."""

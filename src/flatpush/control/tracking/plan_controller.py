@@ -94,6 +94,7 @@ class PlanController(AbstractController[PlanState]):
 
     @property
     def rate(self) -> float:  # type: ignore[override]
+        """Ticks per second [Hz]."""
         return self.inner[0].rate
 
     @classmethod
@@ -117,7 +118,8 @@ class PlanController(AbstractController[PlanState]):
             timing: "even": the plan's time law without its rests: slow at the junctions of its arcs;
                 "plan": from rest to rest in each arc, in the plan's time.
             learn: adapts the model of each push of one finger. sd: of a frame's position and angle [m, rad].
-            tolerance: default: the scene's, of the goal.
+            tolerance: distance and angle of the goal [m, rad]; default: the scene's.
+            rate: ticks per second [Hz]. stale: age at which a frame is too old [s].
 
         Raises:
             InputError: for a plan without pushes, a push without motion, and as the laws do.
@@ -167,7 +169,7 @@ class PlanController(AbstractController[PlanState]):
         return cls(plan, tuple(found), within, limits, stale, sd)
 
     def landing(self, push: int, pose: Array, before: float) -> Array:
-        """Where the pusher is a distance before the contact of a push, with the object at X_WO: X_WE."""
+        """X_WE a distance `before` [m] the contact of a push of that number, with the object at a pose X_WO."""
         return compose(pose, compose(self._model(push).pusher, [-before, 0.0, 0.0]))
 
     def start(self, time: float = 0.0) -> PlanState:

@@ -35,7 +35,8 @@ class Body:
 
     Attributes:
         outline: polygon, convex or not, or circle.
-        discs: centres, shape (k, 2) [m]; radius: of each disc [m]. They may touch or overlap the outline.
+        discs: centres of the discs, shape (k, 2) [m]; they may touch or overlap the outline.
+        radius: of each disc [m].
     """
 
     outline: Outline
@@ -44,6 +45,7 @@ class Body:
 
     @classmethod
     def of(cls, outline: Outline, discs: ArrayLike = (), radius: float = 0.0) -> "Body":
+        """A body of an outline and discs, centres of shape (k, 2) [m] and one radius [m]."""
         return cls(outline, np.asarray(discs, dtype=float).reshape(-1, 2), float(radius))
 
     @cached_property

@@ -18,7 +18,7 @@ class Clearance:
         distance: [m]; 0 where something touches. Negative where the body overlaps an obstacle or leaves the bounds:
             minus how far it is beyond a side or two circles overlap, minus infinity inside a polygon or through its
             edges, where no depth is computed. What crosses by less than a nanometre touches.
-        piece: the piece of the path with the least clearance, from 0.
+        piece: number of the piece of the path with the least clearance, from 0.
         fraction: of that piece, 0 to 1, where it is met.
         obstacle: its number, or -1 for the bounds, or -2 if there is nothing near.
     """
