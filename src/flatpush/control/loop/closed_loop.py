@@ -51,7 +51,7 @@ class Table(Protocol[WorldT]):
         ...
 
     def step(self, state: WorldT, velocity: ArrayLike, dt: float) -> WorldT:
-        """The world after a time [s] in which the hand moves with a velocity in W (vx, vy, yaw rate)."""
+        """The world after a time dt [s] in which the hand moves with a velocity in W (vx, vy, yaw rate)."""
         ...
 
 

@@ -36,7 +36,8 @@ class Limits:
         tips: centres of the fingertips in E, shape (k, 2) [m].
         speed, acceleration: of the fastest fingertip on the table [m/s], [m/s²].
         turn_rate: of the hand, always [rad/s].
-        travel_speed, travel_acceleration: of the fastest fingertip while the hand is lifted, rising included.
+        travel_speed, travel_acceleration: of the fastest fingertip while the hand is lifted, rising included [m/s],
+            [m/s²].
         size: of the object that is pushed [m]; 0: no frame is impossible.
     """
 
@@ -59,7 +60,7 @@ class Limits:
 
     @classmethod
     def of(cls, pusher: Pusher, tips: Array, size: float = 0.0) -> "Limits":
-        """A scene's limits, for fingertips at places in E."""
+        """A scene's limits, for `tips` at places in E, shape (k, 2) [m], and an object of a `size` [m]."""
         return cls(
             tips,
             pusher.speed,
@@ -134,7 +135,7 @@ class Limits:
 
         Args:
             stop: X_WE and height (x, y, θ, height), shape (4,); hand, height: where it is now.
-            last, climb: as in kept. table: whether this leg is made at the speed on the table.
+            last, climb, dt: as in kept. table: whether this leg is made at the speed on the table.
         """
         delta = np.array([*(stop[:3] - hand), stop[3] - height])
         turn = abs(float(delta[2]))

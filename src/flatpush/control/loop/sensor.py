@@ -55,7 +55,12 @@ class Camera:
 
 @dataclass(frozen=True)
 class SensorState:
-    """Frames on their way, and the number of the next one to be taken."""
+    """Frames on their way.
+
+    Attributes:
+        pending: times at which they come [s], and the frames.
+        next_frame: number of the next one to be taken.
+    """
 
     pending: tuple[tuple[float, Measurement], ...] = ()
     next_frame: int = 0
