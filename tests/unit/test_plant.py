@@ -58,6 +58,28 @@ def test_arrays_resist_as_the_surfaces_they_were_made_of(name):
         assert pytest.approx(surface.stick(p * ell, u) * units, abs=1e-10) == V
 
 
+def test_where_the_facet_of_a_foot_ends_the_object_still_turns_about_the_foot():
+    """There the foot's own friction is all used: Newton's method, for wrenches beside facets, is good to 1e-8 only."""
+    arrays = interpreted(surface_arrays(surfaces()["three feet"]))
+    for foot in arrays.feet:
+        about = np.array([foot.y, -foot.x, 1.0])
+        for angle in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+            gx, gy = foot.weight * np.cos(angle), foot.weight * np.sin(angle)
+            F = [foot.fx + gx, foot.fy + gy, foot.t + foot.x * gy - foot.y * gx]
+            V = np.array(twist_of(arrays, *map(float, F)))
+            assert V / np.linalg.norm(V) == pytest.approx(about / np.linalg.norm(about), abs=1e-12)
+            # A contact at a distance r from the foot, pushed square to the arm: the moment of the rotation's wrench
+            # about it, m + r k, is what the foot's friction can balance with that arm.
+            c, s = np.cos(angle), np.sin(angle)
+            m, k = foot.t - foot.x * foot.fy + foot.y * foot.fx, s * foot.fx - c * foot.fy
+            for sign in (1.0, -1.0):
+                r = m / (sign * foot.weight - k)
+                if r > 0:
+                    p, u = [foot.x + r * c, foot.y + r * s], [-s, c]
+                    V = np.array(stick_of(arrays, *map(float, [*p, *u])))
+                    assert pytest.approx(about / r, abs=1e-12 * (1 + 1 / r)) == V
+
+
 @pytest.mark.parametrize("name", list(surfaces()))
 def test_one_contact_moves_as_point_contact_says(name):
     surface = surfaces()[name]
@@ -121,6 +143,35 @@ def test_a_start_inside_is_an_outcome_or_is_pushed_out(square):
     assert out.outcome == ""
     assert out.object == pytest.approx([0.1, 0, 0], abs=1e-9)
     assert plant.follow([0, 0, 0], [[-1.0, 0, 0], [-0.5, 0, 0]], push_out=False).outcome == "starts inside"
+
+
+def test_what_overlaps_a_little_more_than_it_may_is_pushed_out(square):
+    """Deeper than a start may be, and no deeper than twice that."""
+    deep = 1.5 * steps.OVERLAP * square.outline.size
+    plant = Plant(square, [[0.0, 0.0]], 0.1)
+    hand = [-1.1 + deep, 0.2, 0.0]
+    assert plant.start([0, 0, 0], hand, push_out=False).outcome == "starts inside"
+    state = plant.start([0, 0, 0], hand)
+    assert state.outcome == ""
+    assert state.object == pytest.approx([deep, 0, 0], abs=1e-12)
+
+
+def test_a_finger_on_its_way_neither_creeps_nor_leaps(monkeypatch):
+    """Before it touches it goes most of the gap at once, and yet it meets a needle that it would pass in a leap."""
+    monkeypatch.setattr(module, "_patience", [1e9])
+    monkeypatch.setattr(module, "_ready", set())
+    looked = []
+    real = steps._first_touch
+    monkeypatch.setattr(steps, "_first_touch", lambda *args: (looked.append(1), real(*args))[1])
+    needle = fp.Object([(0, 0), (0.04, 0), (0.04, 0.001), (0, 0.001)], friction=0.3)
+    plant = Plant(needle, [[0.0, 0.0]], 0.0002)
+    run = plant.follow([0, 0, 0], [[0.039, -0.43, np.pi / 2], [0.039, 0.4, np.pi / 2]])
+    assert abs(run.object[-1][2]) > 0.1
+    looked.clear()
+    assert np.array_equal(
+        plant.follow([0, 0, 0], [[0.0, -2.0, 0.0], [0.0, -0.02, 0.0]]).object[-1], np.zeros(3)
+    )
+    assert len(looked) < 60  # 3000 steps of a sixtieth of the object
 
 
 def test_a_finger_that_never_touches_leaves_the_object_alone(square):

@@ -9,8 +9,10 @@ all loads with |w - w̄| ≤ δ w̄ at every point and the same sum, the least v
 a fractional knapsack whose dual is attained at the weighted median of g. At a point under the rotation centre û is any
 vector of length at most one, and g its least value there.
 
-Spread pressure is divided into patches. Within a patch g leaves its value at the middle by no more than a bound that is
-added to |g - m|, so that what is called kept is proved, and the answer is on the safe side by the size of the patches.
+Spread pressure is divided into patches. Where g - m changes its sign within a patch, g leaves its value at the centroid
+by no more than a bound of first order, which is added to |g - m|. Elsewhere ∫ |g - m| dw̄ is the patch's load times
+|g - m| at the centroid but for a term of second order, since the linear one vanishes. So what is called kept is proved,
+and the answer is on the safe side by the square of the patches' size.
 """
 
 from collections.abc import Sequence
@@ -35,12 +37,15 @@ UNDER = 1e-9
 # nominal turning centres ahead of the centre of friction.
 DIRECTIONS = np.deg2rad(np.linspace(-30.0, 30.0, 21))
 AHEAD = np.array([0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5])
+# The best of them are tried again with their distances changed by these shares: where the set is nearly too large, the
+# motions that are left are a sliver.
+NEARER = np.array([-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3])
 # Turns are looked at between these radii, by the support's, in so many steps.
 WIDE, TIGHT, STEPS = 100.0, 0.1, 40
 # Points of the pressure on which families are compared, and how many of the best are then proved.
 SKETCH, TRIED = 64, 6
 # Patches that a spread pressure is divided into.
-PATCHES = 400
+PATCHES = 200
 # Normals of two contacts on one straight side differ by less [rad, and of the side's length].
 PARALLEL = 1e-9
 
@@ -70,8 +75,8 @@ class TableSet:
     Attributes:
         support: nominal, about its centre of friction.
         share: δ, at least 0 and less than 1.
-        points, weights: feet or middles of patches, about the nominal centre of friction, shapes (n, 2) [m] and (n,).
-        reach: greatest distance from the middle of each patch to a point of it, shape (n,) [m]; 0 for feet.
+        points, weights: feet or centroids of patches, about the nominal centre of friction, shapes (n, 2) [m] and (n,).
+        reach, along: of the patches, as friction.patches.Patches has them, shapes (n,) [m] and (n, 2).
 
     >>> from flatpush.contact import PointContact
     >>> feet = Support.points([(-0.02, -0.01), (0.02, -0.01), (0.0, 0.02)])
@@ -86,6 +91,7 @@ class TableSet:
     points: Array
     weights: Array
     reach: Array
+    along: Array
 
     @classmethod
     def of(cls, support: Support, share: float, patches: int = PATCHES) -> "TableSet":
@@ -124,13 +130,13 @@ class TableSet:
         V = np.asarray(twist, dtype=float).reshape(1, 3)
         margin, face = self._least(cone, V)
         n = cone.faces[face[0]]
-        g, _ = self._powers(cone, V, n[None])
+        g, *_ = self._powers(cone, V, n[None])
         change = _extreme(g[0, 0], self.weights)
         return WorstTable(float(margin[0]), self.weights * (1 - self.share * change), n)
 
     def _least(self, cone: WrenchCone, V: Array) -> tuple[Array, Array]:
         """Least depths and the faces they are nearest to, both (m,)."""
-        g, slack = self._powers(cone, V, cone.faces)
+        g, first, second = self._powers(cone, V, cone.faces)
         if np.any(self.reach > 0):
             W = self.support.wrench(V) / [1.0, 1.0, cone.lever]
             nominal = W @ cone.faces.T
@@ -138,7 +144,8 @@ class TableSet:
             nominal = g @ self.weights
             W = self._wrenches(cone, V)
         middle = _weighted_median(g, self.weights)
-        spread = (np.abs(g - middle[..., None]) + slack) @ self.weights
+        off = np.abs(g - middle[..., None])
+        spread = (off + np.where(off > first, np.minimum(first, second), first)) @ self.weights
         # By the nominal wrench's size, as a depth is.
         size = np.maximum(np.linalg.norm(W, axis=1), 1e-300)
         heights = (nominal - self.share * spread) / size[:, None]
@@ -163,8 +170,11 @@ class TableSet:
             unit = np.where((distance > UNDER * self.radius)[..., None], v / speed[..., None], 0.0)
         return unit, distance
 
-    def _powers(self, cone: WrenchCone, V: Array, faces: Array) -> tuple[Array, Array]:
-        """g of each twist, face and point, shape (m, k, n), and by how much g may differ within each patch."""
+    def _powers(self, cone: WrenchCone, V: Array, faces: Array) -> tuple[Array, Array, Array]:
+        """g of each twist, face and point, and bounds for each patch, shapes (m, k, n).
+
+        The bounds: of |g - g(p)| at every point of the patch, p its centroid, and of the mean of g - g(p) over it.
+        """
         unit, distance = self._velocities(V)
         x, y = self.points.T / cone.lever
         # g = a · û with a = n_xy + n_τ perp(p), perp(p) = (-y, x).
@@ -174,15 +184,28 @@ class TableSet:
         if np.any(resting):
             g = np.where(resting[:, None], -np.linalg.norm(a, axis=-1), g)
         if not np.any(self.reach > 0):
-            return g, np.zeros(1)
+            return g, np.zeros(1), np.zeros(1)
+        h, slope = self.reach, np.abs(faces[:, 2:]) / cone.lever  # |∇a|
+        size = np.linalg.norm(a, axis=-1)
         # û turns by at most asin(h / d) within h of p; elsewhere, about a centre at d < h, it may be anything.
-        with np.errstate(invalid="ignore"):
-            turn = np.where(distance > self.reach, np.arcsin(np.minimum(self.reach / distance, 1.0)), np.pi)
-        chord = 2 * np.sin(0.5 * turn)
-        slack = (
-            chord[:, None] * np.linalg.norm(a, axis=-1) + np.abs(faces[:, None, 2]) * self.reach / cone.lever
-        )
-        return g, slack
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turn = np.where(distance > h, np.arcsin(np.minimum(h / distance, 1.0)), np.pi)
+            # At a distance ρ from the centre |∇û| = 1/ρ and |∇²û| ≤ 2/(√3 ρ²): û(φ) has unit derivatives, φ has
+            # |∇φ| = 1/ρ and, being harmonic, ∇²φ with the eigenvalues ±1/ρ². A patch keeps ρ ≥ d - h.
+            near = 1 / np.maximum(distance - h, UNDER * self.radius)[:, None]
+            second = 0.5 * h**2 * ((size + slope * h) * 2 / np.sqrt(3) * near**2 + 2 * slope * near)
+            # ∇g = (ω/v) (a · perp(û)) û - n_τ perp(û), and along a straight piece only its part that way counts.
+            swing = (
+                np.sign(V[:, 2:])[:, None]
+                * np.einsum("mni,kni->mkn", perpendicular(unit), a)
+                / distance[:, None]
+            )
+        lean = -faces[:, 2:] / cone.lever
+        u, v = (np.einsum("mni,ni->mn", w, self.along)[:, None] for w in (unit, perpendicular(unit)))
+        straight = np.any(self.along != 0, axis=1)
+        rate = np.where(straight, np.abs(swing * u + lean * v), np.hypot(swing, lean))
+        chord = 2 * np.sin(0.5 * turn)[:, None]
+        return g, np.fmin(chord * size + slope * h, rate * h + second), second
 
 
 def _weighted_median(values: Array, weights: Array) -> Array:
@@ -250,8 +273,7 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     ways = ways[_kept(tables, cones, np.column_stack([ways, np.zeros(len(ways))]))]
     if not len(ways):
         raise NoDubinsReduction(_nothing(tables, "push straight without slipping"))
-    families = np.tile(ways, (len(AHEAD), 1))
-    leans = np.repeat(-ahead * AHEAD, len(ways))[:, None] * perpendicular(straight)
+    families, shares = np.tile(ways, (len(AHEAD), 1)), np.repeat(AHEAD, len(ways))
     # Which families turn tightest is seen on few points; how tightly they may is then proved.
     sketch = (
         tables
@@ -260,9 +282,16 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     )
     found = []
     for sense in (1.0, -1.0):
-        _, tight = _tightest(sketch, cones, families, leans, sense)
-        first = np.argsort(-tight, kind="stable")[:TRIED]
-        centres, tight = _tightest(tables, cones, families[first], leans[first], sense)
+
+        def tightest(
+            table: TableSet, best: Array, shares: Array, sense: float = sense
+        ) -> tuple[Array, Array]:
+            return _tightest(table, cones, best, -ahead * shares[:, None] * perpendicular(straight), sense)
+
+        first = np.argsort(-tightest(sketch, families, shares)[1], kind="stable")[:TRIED]
+        near = np.repeat(families[first], len(NEARER), axis=0), np.add.outer(shares[first], NEARER).ravel()
+        first = np.argsort(-tightest(sketch, *near)[1], kind="stable")[:TRIED]
+        centres, tight = tightest(tables, near[0][first], near[1][first])
         found.append(centres[tight > 0])
     lefts, rights = found
     if not len(lefts) or not len(rights):

@@ -1,20 +1,38 @@
 """A pressure divided into patches with stated sizes, for bounds that must hold at every point of it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..geometry.pose import Array
 from .pressure import Edges, Feet, Pressure, Round
 
 
-def patches(pressure: Pressure, count: int) -> tuple[Array, Array, Array]:
-    """About so many patches of a pressure, about its centre.
+class Patches(NamedTuple):
+    """A pressure about its centre, in patches.
 
-    Returns:
-        A point in each patch, shape (n, 2) [m]; the loads, shape (n,), of sum 1; and a distance from that point that no
-        point of the patch exceeds, shape (n,) [m]. Feet are patches of no size.
+    Attributes:
+        points: the centroid of each, shape (n, 2) [m].
+        loads: shape (n,), of sum 1.
+        reach: a distance from the centroid that no point of the patch exceeds, shape (n,) [m]; 0 of feet.
+        along: unit vectors along the patches that are straight pieces of a line, zero of others, shape (n, 2).
+    """
+
+    points: Array
+    loads: Array
+    reach: Array
+    along: Array
+
+
+def patches(pressure: Pressure, count: int) -> Patches:
+    """About so many patches of a pressure; of feet one each.
+
+    Raises:
+        TypeError: for a kind of pressure that has no patches.
     """
     if isinstance(pressure, Feet):
-        return pressure.points, pressure.weights, np.zeros(len(pressure.points))
+        none = np.zeros_like(pressure.points)
+        return Patches(pressure.points, pressure.weights, none[:, 0], none)
     if isinstance(pressure, Round):
         return _of_round(pressure.radius, pressure.filled, count)
     if not isinstance(pressure, Edges):
@@ -22,7 +40,7 @@ def patches(pressure: Pressure, count: int) -> tuple[Array, Array, Array]:
     return _of_inside(pressure.vertices, count) if pressure.filled else _of_edges(pressure.vertices, count)
 
 
-def _of_edges(vertices: Array, count: int) -> tuple[Array, Array, Array]:
+def _of_edges(vertices: Array, count: int) -> Patches:
     ends = np.roll(vertices, -1, axis=0)
     lengths = np.linalg.norm(ends - vertices, axis=1)
     pieces = np.maximum(1, np.round(count * lengths / lengths.sum())).astype(int)
@@ -30,10 +48,11 @@ def _of_edges(vertices: Array, count: int) -> tuple[Array, Array, Array]:
         a + np.outer((np.arange(n) + 0.5) / n, b - a) for a, b, n in zip(vertices, ends, pieces, strict=True)
     ]
     each = np.repeat(lengths / pieces, pieces)
-    return np.concatenate(points), each / each.sum(), 0.5 * each
+    along = np.repeat((ends - vertices) / lengths[:, None], pieces, axis=0)
+    return Patches(np.concatenate(points), each / each.sum(), 0.5 * each, along)
 
 
-def _of_inside(vertices: Array, count: int) -> tuple[Array, Array, Array]:
+def _of_inside(vertices: Array, count: int) -> Patches:
     """Square cells, cut where they lie across the outline."""
     import shapely
 
@@ -52,19 +71,20 @@ def _of_inside(vertices: Array, count: int) -> tuple[Array, Array, Array]:
     corners, which = shapely.get_coordinates(pieces, return_index=True)
     reach = np.zeros(len(pieces))
     np.maximum.at(reach, which, np.linalg.norm(corners - points[which], axis=1))
-    return points, areas / areas.sum(), reach
+    return Patches(points, areas / areas.sum(), reach, np.zeros_like(points))
 
 
-def _of_round(radius: float, filled: bool, count: int) -> tuple[Array, Array, Array]:
+def _of_round(radius: float, filled: bool, count: int) -> Patches:
     rings = max(1, round(np.sqrt(count / np.pi))) if filled else 1
     found = []
     for k in range(rings):
         inner, outer = (radius * k / rings, radius * (k + 1) / rings) if filled else (radius, radius)
         number = max(6, round(count * (outer**2 - inner**2) / radius**2)) if filled else count
-        angles = 2 * np.pi * (np.arange(number) + 0.5) / number
-        middle = 0.5 * (inner + outer)
-        # Along the ring no point is farther than half the sector at the outer radius, across it half the width.
-        reach = float(np.hypot(0.5 * (outer - inner), np.pi * outer / number))
+        angles, half = 2 * np.pi * (np.arange(number) + 0.5) / number, np.pi / number
+        # The centroid of a sector's arcs, each with its length; the points farthest from it are corners.
+        mean = 2 / 3 * (outer**3 - inner**3) / (outer**2 - inner**2) if filled else radius
+        middle = mean * np.sin(half) / half
+        reach = max(float(np.hypot(r * np.cos(half) - middle, r * np.sin(half))) for r in (inner, outer))
         load = (outer**2 - inner**2) / number if filled else 1.0
         found.append(
             np.column_stack(
@@ -72,4 +92,5 @@ def _of_round(radius: float, filled: bool, count: int) -> tuple[Array, Array, Ar
             )
         )
     x, y, loads, reach_of = np.concatenate(found).T
-    return np.stack([x, y], axis=1), loads / loads.sum(), reach_of
+    points = np.stack([x, y], axis=1)
+    return Patches(points, loads / loads.sum(), reach_of, np.zeros_like(points))

@@ -14,7 +14,7 @@ def push_out(fingers: Fingers, q: Array, hands: Array) -> None:
     """Moves an object q (3,) that overlaps fingers out of them, in place, the shortest way."""
     for _ in range(50):
         inside = {(t.finger, t.slot): t.gap for t in fingers.near(q, hands) if t.gap < 0}
-        if min(inside.values(), default=0.0) >= -1e-3 * TOUCH * fingers.outline.size:
+        if min(inside.values(), default=0.0) >= -TOUCH * fingers.outline.size:
             break
         q[:] = fingers.settle(q, hands, set(inside), [])
 

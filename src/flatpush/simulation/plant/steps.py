@@ -325,7 +325,7 @@ def push_out(setting: Setting, q: Row, hands: Rows, scratch: Scratch) -> None:
                 worst = max(worst, setting.radius - place.distance)
             if second(setting.outline, x, y, place.feature).distance - setting.radius < 0:
                 mask |= 1 << (2 * i + 1)
-        if worst <= 1e-3 * TOUCH * setting.outline.size:
+        if worst <= TOUCH * setting.outline.size:  # every step closes what touches
             break
         _settle(setting, move, 0.0, q, mask, 0, scratch.contacts)
 
