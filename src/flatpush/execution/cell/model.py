@@ -57,7 +57,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
         tips: of the fingertips in E, shape (k, 2).
     """
     thing, high = scene.object, height_of(scene)
-    places, loads, _ = patches(thing.support.pressure, physics.feet)
+    places, loads, *_ = patches(thing.support.pressure, physics.feet)
     places = places + thing.support.centre
     assets, sides, names = _body(thing.outline, high)
     feet = "".join(
