@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import FlatpushError, InputError, MissingExtra
 
 PATIENCE = 8.0  # [s] for a scheduler to find workers
-ANSWER = 3.0  # [s] for it to say who it is
+ANSWER = 1.0  # [s] for it to say who it is
 
 
 @contextmanager
