@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...compiled import inner, kernel
+from ...compiled import inner, kernel, shared
 from ...geometry.pose import Array
-from ...steering.six_words import LEFT, STRAIGHT, TURN, Records
+from ...steering.six_words import CAR, LEFT, STRAIGHT, TURN, WORD, Records
 
 MOST = 48  # arcs of a chain
 BOTTOM = 1e-13  # an amount below this is nothing [m]
@@ -87,6 +87,10 @@ class Work(NamedTuple):
         )  # fmt: skip
 
 
+_CARS, _PUSHES, _LAM = np.zeros(1, CAR), np.zeros(1, np.int64), np.zeros(1)
+_WORK, _ARCS = Work.of(np.zeros(1, WORD), np.zeros((2, 3)), 0.0, 0.0), np.zeros(1, ARC)
+
+
 @inner
 def _lay(arc: Any, car: Any, leg: int, letter: int, y: float) -> None:
     """Makes a record an arc of a leg with a car."""
@@ -102,7 +106,7 @@ def _lay(arc: Any, car: Any, leg: int, letter: int, y: float) -> None:
     arc.speed, arc.acceleration = car.speed[letter], car.acceleration[letter]
 
 
-@inner
+@shared(None, _ARCS, 0)
 def _drive(arcs: Records, n: int) -> None:
     """Poses before every arc and at the end (arcs[n]), and the derivatives of the end, from the pose of arcs[0]."""
     for k in range(n):
@@ -125,7 +129,7 @@ def _drive(arcs: Records, n: int) -> None:
             arc.end_x, arc.end_y = -arc.kappa * y, arc.kappa * x
 
 
-@inner
+@shared(0.0, _ARCS, 0)
 def _cost(arcs: Records, n: int) -> float:
     """Cost of the arcs; their gradients are filled in."""
     total = 0.0
@@ -159,6 +163,29 @@ def _lengths(arcs: Records, n: int, legs: Array) -> None:
 
 
 @inner
+def _eliminate(K: Array, size: int) -> None:
+    """Gauss with row pivots on the augmented matrix (size, size + 1); the solution ends up in the last column."""
+    for col in range(size):
+        pivot = col
+        for row in range(col + 1, size):
+            if abs(K[row, col]) > abs(K[pivot, col]):
+                pivot = row
+        for j in range(col, size + 1):
+            K[col, j], K[pivot, j] = K[pivot, j], K[col, j]
+        inverse = 1.0 / K[col, col] if K[col, col] != 0.0 else 0.0
+        for row in range(col + 1, size):
+            factor = K[row, col] * inverse
+            if factor != 0.0:
+                for j in range(col + 1, size + 1):
+                    K[row, j] -= factor * K[col, j]
+    for col in range(size - 1, -1, -1):
+        value = K[col, size]
+        for j in range(col + 1, size):
+            value -= K[col, j] * K[j, size]
+        K[col, size] = value / K[col, col] if K[col, col] != 0.0 else 0.0
+
+
+@shared(0.0, _WORK, _ARCS, 0, 0.0)
 def _solve(work: Work, arcs: Records, n: int, damping: float) -> float:
     """The steps of the arcs and the multipliers: [W + damping/radius, -B'; B, 0] (step, λ) = (-gradient, -miss).
 
@@ -231,30 +258,7 @@ def _solve(work: Work, arcs: Records, n: int, damping: float) -> float:
     return off
 
 
-@inner
-def _eliminate(K: Array, size: int) -> None:
-    """Gauss with row pivots on the augmented matrix (size, size + 1); the solution ends up in the last column."""
-    for col in range(size):
-        pivot = col
-        for row in range(col + 1, size):
-            if abs(K[row, col]) > abs(K[pivot, col]):
-                pivot = row
-        for j in range(col, size + 1):
-            K[col, j], K[pivot, j] = K[pivot, j], K[col, j]
-        inverse = 1.0 / K[col, col] if K[col, col] != 0.0 else 0.0
-        for row in range(col + 1, size):
-            factor = K[row, col] * inverse
-            if factor != 0.0:
-                for j in range(col + 1, size + 1):
-                    K[row, j] -= factor * K[col, j]
-    for col in range(size - 1, -1, -1):
-        value = K[col, size]
-        for j in range(col + 1, size):
-            value -= K[col, j] * K[j, size]
-        K[col, size] = value / K[col, col] if K[col, col] != 0.0 else 0.0
-
-
-@inner
+@shared(False, _WORK, _ARCS, 0)
 def _close(work: Work, arcs: Records, n: int) -> bool:
     """Leads the chain back to the goal with the smallest changes of its free arcs."""
     work.phase[0] = CLOSING
@@ -291,7 +295,7 @@ def _release(arcs: Records, n: int, short: np.ndarray, lam: Array) -> bool:
     return leg >= 0 or which >= 0
 
 
-@inner
+@shared((0, False), _CARS, _PUSHES, _ARCS, 0, _LAM, _ARCS[0])
 def _take_in(
     cars: Records, pushes: np.ndarray, arcs: Records, n: int, lam: Array, spare: Any
 ) -> tuple[int, bool]:
@@ -334,7 +338,7 @@ def _take_in(
     return n + 1, True
 
 
-@kernel()
+@kernel(lent=True)
 def descend(work: Work, cars: Records, pushes: np.ndarray, words: Records, poses: Array, steps: int) -> bool:
     """One descent from the words of the legs; sets the inner poses. False if the goal or the lengths cannot be met."""
     now, trial, legs, short, radius = work.now, work.trial, work.legs, work.short, work.radius
