@@ -70,7 +70,7 @@ def block(function: F) -> F:
     return nb.njit(forceinline=True, **_PLAIN, **_FUSED)(function)
 
 
-def shared(returns: object, *examples: object) -> Callable[[F], F]:
+def shared(returns: object, *examples: object, fused: bool = False) -> Callable[[F], F]:
     """Decorates a large function that many kernels call: compiled once, and called by its address.
 
     numba copies whatever a kernel calls into it and optimises it there anew, which for large callees is most of what
@@ -79,11 +79,17 @@ def shared(returns: object, *examples: object) -> Callable[[F], F]:
 
     Args:
         returns, examples: a value of the type that it returns, and of that of each argument.
+        fused: multiply and add at once.
     """
 
     def decorated(function: F) -> F:
         signature = nb.typeof(returns)(*(nb.typeof(example) for example in examples))
-        made = _Shared(function, (signature.args, signature.return_type), locals={}, options=_PLAIN)
+        made = _Shared(
+            function,
+            (signature.args, signature.return_type),
+            locals={},
+            options=_PLAIN | (_FUSED if fused else {}),
+        )
         made._cache = _Kept(made)  # type: ignore[attr-defined]
         made.compile()
         symbol = f"{function.__module__}.{function.__qualname__}"

@@ -9,7 +9,7 @@ from flatpush.errors import InputError
 from flatpush.geometry import compose
 from flatpush.steering import dubins, shortest_word, words
 from flatpush.steering.fleet import Fleet
-from flatpush.steering.lengths import axle, dubins_lengths, fleet_lengths, time_laws
+from flatpush.steering.lengths import axle, dubins_lengths, fleet_lengths, timed_car
 from flatpush.steering.three_twist import Word, end_pose
 
 SAME = 1e-9
@@ -166,10 +166,10 @@ def test_a_dubins_car_costs_its_dubins_length():
 
 def test_time_laws_meet_at_the_knee():
     fleet = random_fleet(np.random.default_rng(6), 1, timed=True)
-    for slope, ramp, root, knee in time_laws(fleet, 0):
+    car = timed_car(fleet, 0)[1]
+    for slope, ramp, root, knee in (car.left, car.straight, car.right):
         assert slope * knee + ramp == pytest.approx(np.sqrt(root * knee))
-    assert time_laws(dubins_fleet(1.0, np.zeros(3)), 0) is None
-    assert np.hypot(*axle(fleet, 0)[1][1:3]) == pytest.approx(1.0)
+    assert np.hypot(*axle(fleet, 0)[2:]) == pytest.approx(1.0)
 
 
 def test_threads_change_nothing():
@@ -250,15 +250,17 @@ def test_the_loops_are_vectorised():
     if not (features.get("avx512f") or features.get("avx2")):
         pytest.skip("this machine has neither AVX-512 nor AVX2")
     register = "zmm" if features.get("avx512f") else "ymm"
+    from flatpush.steering.kernels import Frame, Law, Timed, Weighted
     from flatpush.steering.lengths import kernels
 
     # Compiled afresh, because a cached kernel keeps no assembly.
     poses, table = np.zeros((1, 8, 3)), np.zeros((1, 8))
-    numbers, law = np.ones(6), (1.0,) * 4
+    here, law = Frame(0.0, 0.0, 1.0, 0.0, 0.0), Law(1.0, 1.0, 1.0, 1.0)
+    scratch = kernels.Bounds(0, 1, 0, 8), kernels.Tiles.new(), table
     for kernel, arguments in (
-        (kernels.dubins_lengths, (poses, poses, 1.0, (0, 1, 0, 8), table)),
-        (kernels.three_twist_costs, (poses, poses, np.ones(5), numbers, (0, 1, 0, 8), table)),
-        (kernels.timed_costs, (poses, poses, np.ones(5), numbers, (law,) * 3, (0, 1, 0, 8), table)),
+        (kernels.dubins_lengths, (poses, poses, 1.0, *scratch)),
+        (kernels.three_twist_costs, (poses, poses, here, Weighted(1.0, 1.0, 0.0, 1.0, 1.0, 1.0), *scratch)),
+        (kernels.timed_costs, (poses, poses, here, Timed(1.0, 1.0, 0.0, law, law, law), *scratch)),
     ):
         fresh = type(kernel)(kernel.py_func, targetoptions=kernel.targetoptions)
         fresh(*arguments)

@@ -16,17 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import is_number, numbers
 from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
+from .checked import checked_radius, finite_poses, shaped_poses
 
 TURN = 2 * np.pi
 # A path is accepted if it ends within this of the goal, per (radius + city-block distance of start and goal).
 # The heading is always met. It lies above the rounding of sane input and below the 1e-9 that is promised.
 TOLERANCE = 4e-10
-# Radii that are told apart from nothing and from a straight line [m]: below, squares underflow; above, the tolerance
-# of where a path ends is more than a metre, so that poses beside each other would count as one.
-RADII = 1e-100, 1e9
 SENSE = {"L": 1.0, "S": 0.0, "R": -1.0}
 _MIRROR = str.maketrans("LR", "RL")
 
@@ -88,11 +85,11 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, radius: float) -> DubinsPat
     >>> shortest_path([1, 2, 3], [1, 2, 3], 0.1).length
     0.0
     """
-    X, Y = _poses(start, "start"), _poses(goal, "goal")
+    X, Y = finite_poses(start, "start"), finite_poses(goal, "goal")
     for name, pose in (("start", X), ("goal", Y)):
         if pose.shape != (3,):
             raise InputError(f"the {name} is one pose (x, y, heading)", value=pose.shape)
-    word, arcs = _shortest(X, Y, _checked_radius(radius))
+    word, arcs = _shortest(X, Y, checked_radius(radius))
     return DubinsPath(word, radius * np.array(arcs), X, float(radius))
 
 
@@ -115,7 +112,7 @@ def shortest_length(starts: ArrayLike, goals: ArrayLike, radius: float) -> Array
     """
     from .lengths import dubins_lengths
 
-    X, Y = _shaped_poses(starts, "starts"), _shaped_poses(goals, "goals")
+    X, Y = shaped_poses(starts, "starts"), shaped_poses(goals, "goals")
     if X.ndim == Y.ndim == 1:
         return np.asarray(shortest_path(X, Y, radius).length)
     return dubins_lengths(X, Y, radius)
@@ -167,27 +164,3 @@ def _end(word: str, arcs: tuple[float, float, float]) -> complex:
             turn = cmath.exp(1j * SENSE[letter] * arc)
             position, direction = centre + (position - centre) * turn, direction * turn
     return position
-
-
-def _poses(values: ArrayLike, name: str) -> Array:
-    poses = _shaped_poses(values, name)
-    if not np.isfinite(poses).all():
-        raise InputError(f"{name}: poses are finite", value=poses[~np.isfinite(poses).all(axis=-1)])
-    return poses
-
-
-def _shaped_poses(values: ArrayLike, name: str) -> Array:
-    poses = numbers(values, f"{name}: poses are numbers (x, y, heading)")
-    if poses.ndim == 0 or poses.shape[-1] != 3:
-        raise InputError(f"{name}: poses have the shape (..., 3)", value=poses.shape)
-    return poses
-
-
-def _checked_radius(radius: float) -> float:
-    if not is_number(radius):
-        raise InputError("the radius is a number", value=radius)
-    if not RADII[0] <= radius <= RADII[1]:
-        raise InputError(
-            f"the radius is positive and finite [m], from {RADII[0]:g} to {RADII[1]:g}", value=radius
-        )
-    return float(radius)

@@ -4,38 +4,12 @@ The lengths are computed without a branch, so that LLVM does several pairs at on
 whether an arc needs a full turn more, are decided by signs of cross products and become selects. Half of the words
 are mirror images of the others. Poses come as cosine and sine, and few angles need an inverse function:
 the arcs of LSL add up to the heading difference, those of LRL to that less the apex angle.
-
-Each function compiles when it is first called, so that only what is used is paid for.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from ..geometry.pose import Array
-from .vectors.kernels import (
-    SLACK,
-    TURN,
-    _angle,
-    _large,
-    _ratio,
-    _select,
-    _small,
-    _turned,
-    _widest_vectors,
-    batch,
-    block,
-)
-
-__all__ = [
-    "_angle",
-    "_widest_vectors",
-    "dubins_between",
-    "shortest_word",
-    "three_twist_between",
-    "timed_between",
-]
+from .vectors.kernels import SLACK, TURN, _large, _ratio, _select, _small, _turned, block
 
 TOLERANCE = 4e-10  # as in dubins.py; of a length, per length of the query
 LOOSE = 2e-10  # as in three_twist.py, where a length is that of the centres as well
@@ -43,28 +17,70 @@ NEAR = 4 * TOLERANCE  # where what is compared is four times a length, or a squa
 NEVER = 1e300
 TINY = 1e-30
 
-Four = tuple[float, float, float, float]
+
+class Pieces(NamedTuple):
+    """First arc, straight piece and last arc of a word, and 0, or NEVER where it leads nowhere."""
+
+    first: float
+    way: float
+    last: float
+    unfit: float
+
+
+class Frame(NamedTuple):
+    """A pose: place [turning radii], cosine and sine of its heading, and the heading in [0, 2π) [rad]."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+    heading: float
+
+
+class Weighted(NamedTuple):
+    """A car of linear costs.
+
+    Attributes:
+        radius: half the distance R of the turning centres [m].
+        tilt_c, tilt_s: the straight direction seen from the axle's heading, tilt_c > 0.
+        left, straight, right: cost of a radian to the left, of a length R straight on and of a radian to the right.
+    """
+
+    radius: float
+    tilt_c: float
+    tilt_s: float
+    left: float
+    straight: float
+    right: float
+
+
+class Law(NamedTuple):
+    """The time of a piece from rest to rest: slope · amount + ramp above the knee, √(root · amount) below."""
+
+    slope: float
+    ramp: float
+    root: float
+    knee: float
+
+
+class Timed(NamedTuple):
+    """A car whose pieces take time, as Weighted; the laws are per radian or length R."""
+
+    radius: float
+    tilt_c: float
+    tilt_s: float
+    left: Law
+    straight: Law
+    right: Law
 
 
 @block
-def dubins_between(
-    xi: float,
-    yi: float,
-    ci: float,
-    si: float,
-    hi: float,
-    xj: float,
-    yj: float,
-    cj: float,
-    sj: float,
-    hj: float,
-) -> float:
+def dubins_between(i: Frame, j: Frame) -> float:
     """Length of the shortest Dubins path from pose i to pose j [radii].
 
-    A pose is x and y [radii], cosine and sine of its heading, and the heading in [0, 2π). Without a branch: a loop
-    over i or j does several at once if its function calls _widest_vectors() and has error_model="numpy".
+    Without a branch: a loop over i or j does several at once if its function calls _widest_vectors().
     """
-    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    x, y, c, s, delta = _seen_from(i, j)
     back = TURN - delta
     k = 1.0 - c
     # The goal's offset along and across its own heading; straight pieces of LSR and RSL, LSL and RSR.
@@ -132,30 +148,14 @@ def dubins_between(
 
 
 @block
-def three_twist_between(
-    xi: float,
-    yi: float,
-    ci: float,
-    si: float,
-    hi: float,
-    xj: float,
-    yj: float,
-    cj: float,
-    sj: float,
-    hj: float,
-    tilt_c: float,
-    tilt_s: float,
-    wl: float,
-    ws: float,
-    wr: float,
-) -> float:
+def three_twist_between(i: Frame, j: Frame, car: Weighted) -> float:
     """Cost of the cheapest word of a car with any centres, as three_twist.shortest_word finds it.
 
-    A pose is that of the axle, given as in dubins_between: the midpoint of the turning centres in units of half their
-    distance R, and the heading across their line (with the left centre to the left). The straight direction is
-    (tilt_c, tilt_s) seen from that heading, tilt_c > 0. wl, wr: cost of a radian; ws: of a length R straight on.
+    A pose is that of the axle: the midpoint of the turning centres in units of half their distance, and the heading
+    across their line (with the left centre to the left).
     """
-    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    tilt_c, tilt_s, wl, ws, wr = car.tilt_c, car.tilt_s, car.left, car.straight, car.right
+    x, y, c, s, delta = _seen_from(i, j)
     back = TURN - delta
     for_left = _alike(x, y, c, s, delta, tilt_c, tilt_s)
     for_right = _alike(x, -y, c, -s, back, tilt_c, -tilt_s)
@@ -168,57 +168,43 @@ def three_twist_between(
     cost = _small(wl * (TURN - z) + wr * long, wl * z + wr * short)
     best = _select(straight <= 4.0 + NEAR, _small(best, cost), best)
     lsr, rsl, other = _unlike(x, y, c, s, delta, tilt_c, tilt_s)
-    best = _small(best, ws * lsr[1] + (wl * lsr[0] + wr * lsr[2]) + lsr[3])
-    best = _small(best, ws * rsl[1] + (wr * rsl[0] + wl * rsl[2]) + rsl[3])
+    best = _small(best, ws * lsr.way + (wl * lsr.first + wr * lsr.last) + lsr.unfit)
+    best = _small(best, ws * rsl.way + (wr * rsl.first + wl * rsl.last) + rsl.unfit)
     wa, wb = _select(tilt_s > 0.0, wl, wr), _select(tilt_s > 0.0, wr, wl)
-    return _small(best, ws * other[1] + (wa * other[0] + wb * other[2]) + other[3])
+    return _small(best, ws * other.way + (wa * other.first + wb * other.last) + other.unfit)
 
 
 @block
-def timed_between(
-    xi: float,
-    yi: float,
-    ci: float,
-    si: float,
-    hi: float,
-    xj: float,
-    yj: float,
-    cj: float,
-    sj: float,
-    hj: float,
-    tilt_c: float,
-    tilt_s: float,
-    left: Four,
-    straight: Four,
-    right: Four,
-) -> float:
+def timed_between(i: Frame, j: Frame, car: Timed) -> float:
     """As three_twist_between where each piece starts and ends at rest, so that its time is no multiple of its length.
 
-    A law holds (slope, ramp, root, knee) per radian or length R: an amount takes slope · amount + ramp where it
-    exceeds the knee, and the root of root · amount where it does not (lengths.time_laws).
+    See lengths.timed_car.
     """
-    x, y, c, s, delta = _seen_from(xi, yi, ci, si, hi, xj, yj, cj, sj, hj)
+    tilt_c, tilt_s, left, straight, right = car.tilt_c, car.tilt_s, car.left, car.straight, car.right
+    x, y, c, s, delta = _seen_from(i, j)
     best = _timed_alike(_alike(x, y, c, s, delta, tilt_c, tilt_s), delta, left, straight, right)
     back = TURN - delta
     cost = _timed_alike(_alike(x, -y, c, -s, back, tilt_c, -tilt_s), back, right, straight, left)
     best = _small(best, cost)
     lsr, rsl, other = _unlike(x, y, c, s, delta, tilt_c, tilt_s)
     tilts_left = tilt_s > 0.0
-    first = _select(tilts_left, _time(left, other[0]), _time(right, other[0]))
-    last = _select(tilts_left, _time(right, other[2]), _time(left, other[2]))
-    best = _small(best, first + _time(straight, other[1]) + last + other[3])
-    cost = _time(left, lsr[0]) + _time(straight, lsr[1]) + _time(right, lsr[2]) + lsr[3]
+    first = _select(tilts_left, _time(left, other.first), _time(right, other.first))
+    last = _select(tilts_left, _time(right, other.last), _time(left, other.last))
+    best = _small(best, first + _time(straight, other.way) + last + other.unfit)
+    cost = _time(left, lsr.first) + _time(straight, lsr.way) + _time(right, lsr.last) + lsr.unfit
     best = _small(best, cost)
-    return _small(best, _time(right, rsl[0]) + _time(straight, rsl[1]) + _time(left, rsl[2]) + rsl[3])
+    return _small(
+        best, _time(right, rsl.first) + _time(straight, rsl.way) + _time(left, rsl.last) + rsl.unfit
+    )
 
 
 @block
-def _time(law: Four, amount: float) -> float:
-    return _select(amount > law[3], law[0] * amount + law[1], math.sqrt(law[2] * amount))
+def _time(law: Law, amount: float) -> float:
+    return _select(amount > law.knee, law.slope * amount + law.ramp, math.sqrt(law.root * amount))
 
 
 @block
-def _timed_alike(found: Any, delta: float, outer: Four, straight: Four, middle: Four) -> float:
+def _timed_alike(found: Any, delta: float, outer: Law, straight: Law, middle: Law) -> float:
     way, same, z, long, short, vx, vy, tx, ty, nx, ny, tolerance, d_long, d_short = found
     first = _first(vx, vy, way, same, delta, tolerance)
     best = _time(outer, first) + _time(straight, way) + _time(outer, same - first)
@@ -287,8 +273,8 @@ def _both(vx: float, vy: float, wx: float, wy: float, angle: float, tolerance: f
 @block
 def _unlike(
     x: float, y: float, c: float, s: float, delta: float, tilt_c: float, tilt_s: float
-) -> tuple[Four, Four, Four]:
-    """LSR, RSL and the second solution of the one that leans back: first arc, straight piece, last arc, 0 or NEVER."""
+) -> tuple[Pieces, Pieces, Pieces]:
+    """LSR, RSL and the second solution of the one that leans back."""
     k, back = 1.0 + c, TURN - delta
     lx, ly, rx, ry = x + s, y - k, x - s, -(y + k)
     width, lean = 2.0 * tilt_c, 2.0 * tilt_s
@@ -316,29 +302,18 @@ def _unlike(
     r_fit = _select(_small(r_rest, r_way) >= -NEAR, 0.0, NEVER)
     o_fit = _select(_small(o_rest, o_way) >= -NEAR, 0.0, NEVER)
     return (
-        (a, _large(l_way, 0.0), _remaining(a, delta), l_fit),
-        (b, _large(r_way, 0.0), _remaining(b, back), r_fit),
-        (o, _large(o_way, 0.0), _remaining(o, o_delta), o_fit),
+        Pieces(a, _large(l_way, 0.0), _remaining(a, delta), l_fit),
+        Pieces(b, _large(r_way, 0.0), _remaining(b, back), r_fit),
+        Pieces(o, _large(o_way, 0.0), _remaining(o, o_delta), o_fit),
     )
 
 
 @block
-def _seen_from(
-    xi: float,
-    yi: float,
-    ci: float,
-    si: float,
-    hi: float,
-    xj: float,
-    yj: float,
-    cj: float,
-    sj: float,
-    hj: float,
-) -> tuple[float, float, float, float, float]:
+def _seen_from(i: Frame, j: Frame) -> tuple[float, float, float, float, float]:
     """Pose j in the frame of pose i: x, y, cosine, sine, heading in [0, 2π]."""
-    gx, gy, delta = xj - xi, yj - yi, hj - hi
+    gx, gy, delta = j.x - i.x, j.y - i.y, j.heading - i.heading
     delta = _select(delta < 0.0, delta + TURN, delta)
-    return ci * gx + si * gy, ci * gy - si * gx, ci * cj + si * sj, ci * sj - si * cj, delta
+    return i.c * gx + i.s * gy, i.c * gy - i.s * gx, i.c * j.c + i.s * j.s, i.c * j.s - i.s * j.c, delta
 
 
 @block
@@ -346,64 +321,3 @@ def _remaining(first: float, delta: float) -> float:
     """The last arc of a word that turns back."""
     last = first - delta
     return _large(_select(last < -SLACK, last + TURN, last), 0.0)
-
-
-@batch
-def shortest_word(
-    c_left: Array, c_right: Array, direction: Array, start: Array, goal: Array, weights: Array
-) -> tuple[int, float, float, float, float]:
-    """three_twist.shortest_word without its checks: (index in three_twist.WORDS, parameters, cost)."""
-    c, s = math.cos(start[2]), math.sin(start[2])
-    gx, gy = goal[0] - start[0], goal[1] - start[1]
-    x, y = c * gx + s * gy, c * gy - s * gx
-    theta = goal[2] - start[2]
-    c, s = math.cos(theta), math.sin(theta)
-    size = math.hypot(direction[0], direction[1])
-    ux, uy = direction[0] / size, direction[1] / size
-    span = math.hypot(c_left[0] - c_right[0], c_left[1] - c_right[1])
-    tolerance = 1e-10 * (math.hypot(x, y) + span)
-
-    word, first, middle, last, cost = -1, 0.0, 0.0, 0.0, np.inf
-    for index in range(6):
-        begins_left, ends_left = index % 2 == 0, index == 0 or index == 3 or index == 4
-        a = c_left if begins_left else c_right
-        b = c_left if ends_left else c_right
-        other = c_right if begins_left else c_left
-        sense_a, sense_b = 1.0 if begins_left else -1.0, 1.0 if ends_left else -1.0
-        wx, wy = x + c * b[0] - s * b[1] - a[0], y + s * b[0] + c * b[1] - a[1]
-        length = math.hypot(wx, wy)
-        dx, dy = b[0] - a[0], b[1] - a[1]
-        along, across = dx * ux + dy * uy, dx * uy - dy * ux
-        root = math.sqrt(max(0.0, length * length - across * across))
-        apex = 2.0 * math.asin(min(1.0, length / (2.0 * span)))
-        for option in range(2):
-            if index < 4:
-                turned = 0.0
-                amount = max(0.0, (root if option == 0 else -root) - along)
-                arm_x, arm_y = dx + amount * ux, dy + amount * uy
-                price = weights[1] * amount
-            else:
-                amount = apex if option == 0 else TURN - apex
-                turned = -sense_a * amount
-                ex, ey = 1.0 - math.cos(turned), -math.sin(turned)
-                ox, oy = other[0] - a[0], other[1] - a[1]
-                arm_x, arm_y = ox * ex - oy * ey, ox * ey + oy * ex
-                price = (weights[2] if begins_left else weights[0]) * amount
-            # Cheap refusals: already dearer, or an arm that no turn can lay on w.
-            if price >= cost or abs(math.hypot(arm_x, arm_y) - length) > tolerance:
-                continue
-            exact = math.atan2(wy, wx) - math.atan2(arm_y, arm_x)
-            for snap in range(3):
-                alpha = exact if snap == 0 else (0.0 if snap == 1 else theta - turned)
-                angle_a = (sense_a * alpha) % TURN
-                angle_b = (sense_b * (theta - turned - alpha)) % TURN
-                total = (
-                    price
-                    + weights[0 if begins_left else 2] * angle_a
-                    + weights[0 if ends_left else 2] * angle_b
-                )
-                if total < cost:
-                    ca, sa = math.cos(alpha), math.sin(alpha)
-                    if math.hypot(ca * arm_x - sa * arm_y - wx, sa * arm_x + ca * arm_y - wy) <= tolerance:
-                        word, first, middle, last, cost = index, angle_a, amount, angle_b, total
-    return word, first, middle, last, cost

@@ -5,15 +5,18 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ..dubins import _checked_radius, _poses, _shaped_poses
+from ..checked import checked_radius, finite_poses, shaped_poses
 from ..fleet import Fleet
+
+if TYPE_CHECKING:
+    from ..kernels import Frame, Timed, Weighted
 
 THREADED = 100_000  # pairs from which threads are worth starting
 
@@ -37,11 +40,13 @@ def dubins_lengths(starts: ArrayLike, goals: ArrayLike, radius: float, threads: 
     """
     from .kernels import dubins_lengths as fill
 
-    radius = _checked_radius(radius)
+    radius = checked_radius(radius)
     shape, table, X, Y = _pairs(starts, goals)
     lengths = np.empty(table)
     if lengths.size:
-        _share(lambda bounds: fill(X, Y, radius, bounds, lengths), table, threads, (starts, goals))
+        _share(
+            lambda bounds, tiles: fill(X, Y, radius, bounds, tiles, lengths), table, threads, (starts, goals)
+        )
     return lengths.reshape(shape)
 
 
@@ -67,13 +72,15 @@ def fleet_lengths(fleet: Fleet, starts: ArrayLike, goals: ArrayLike, threads: in
     return costs.reshape(fleet.size, *shape)
 
 
-def axle(fleet: Fleet, car: int) -> tuple[Array, Array]:
-    """A car as kernels.three_twist_between takes it.
+def axle(fleet: Fleet, car: int) -> tuple["Frame", float, float, float]:
+    """The axle of a car and its straight direction.
 
     Returns:
-        The axle (x, y, cosine, sine, heading) in the object frame, the heading across the line of the turning centres,
-        in [0, 2π); and (R, tilt_c, tilt_s, wl, ws, wr), the weights without a time law.
+        The axle in the object frame [m], the heading across the line of the turning centres; half the distance of
+        these [m]; and the straight direction seen from the heading, its cosine and its sine.
     """
+    from ..kernels import Frame
+
     span = fleet.left[car] - fleet.right[car]
     radius = 0.5 * float(np.hypot(*span))
     ahead = np.array([span[1], -span[0]]) / (2 * radius)
@@ -81,61 +88,70 @@ def axle(fleet: Fleet, car: int) -> tuple[Array, Array]:
     middle = 0.5 * (fleet.left[car] + fleet.right[car])
     tilt = np.array([ahead @ fleet.direction[car], side @ fleet.direction[car]])
     tilt = np.array([1.0, 0.0]) if abs(tilt[1]) <= 1e-15 else tilt / np.hypot(*tilt)
-    return (
-        np.array([*middle, *ahead, np.arctan2(ahead[1], ahead[0]) % (2 * np.pi)]),
-        np.array([radius, *tilt, *(fleet.rates[car] * [1.0, radius, 1.0])]),
-    )
+    (x, y), (c, s) = middle.tolist(), ahead.tolist()
+    return Frame(x, y, c, s, float(np.arctan2(s, c) % (2 * np.pi))), radius, float(tilt[0]), float(tilt[1])
 
 
-def time_laws(fleet: Fleet, car: int) -> tuple[tuple[float, float, float, float], ...] | None:
-    """Laws of left turn, straight and right turn as kernels.timed_between takes them, or None if the cost is linear.
+def weighted_car(fleet: Fleet, car: int) -> tuple["Frame", "Weighted"]:
+    """The axle and the car as kernels.three_twist_between takes it, without a time law."""
+    from ..kernels import Weighted
+
+    frame, radius, *tilt = axle(fleet, car)
+    return frame, Weighted(radius, *tilt, *(fleet.rates[car] * [1.0, radius, 1.0]).tolist())
+
+
+def timed_car(fleet: Fleet, car: int) -> tuple["Frame", "Timed"]:
+    """The axle and the car as kernels.timed_between takes it.
 
     A way of length w takes w/v + v/a, or 2 √(w/a) where it is shorter than v²/a and the speed v is not reached.
     """
-    v, a = fleet.speeds[car], fleet.accelerations[car]
-    if np.all(np.isinf(v)):
-        return None
-    unit = fleet.rates[car] * np.array([1.0, float(fleet.radius[car]), 1.0])
+    from ..kernels import Law, Timed
+
+    frame, radius, tilt_c, tilt_s = axle(fleet, car)
+    v, a, unit = fleet.speeds[car], fleet.accelerations[car], fleet.rates[car] * [1.0, radius, 1.0]
     laws = np.stack([unit / v, v / a, 4 * unit / a, v**2 / (a * unit)], axis=1)
-    left, straight, right = (tuple(float(number) for number in law) for law in laws)
-    return left, straight, right  # type: ignore[return-value]
+    left, straight, right = (Law(*law) for law in laws.tolist())
+    return frame, Timed(radius, tilt_c, tilt_s, left, straight, right)
 
 
-def _car_filler(fleet: Fleet, car: int, X: Array, Y: Array, costs: Array) -> Callable[[Any], bool]:
+def _car_filler(fleet: Fleet, car: int, X: Array, Y: Array, costs: Array) -> Callable[..., bool]:
     from .kernels import three_twist_costs, timed_costs
 
-    body, numbers = axle(fleet, car)
-    laws = time_laws(fleet, car)
-    if laws is None:
-        return lambda bounds: three_twist_costs(X, Y, body, numbers, bounds, costs)
-    return lambda bounds: timed_costs(X, Y, body, numbers, laws, bounds, costs)
+    if np.all(np.isinf(fleet.speeds[car])):
+        body, weighted = weighted_car(fleet, car)
+        return lambda bounds, tiles: three_twist_costs(X, Y, body, weighted, bounds, tiles, costs)
+    body, timed = timed_car(fleet, car)
+    return lambda bounds, tiles: timed_costs(X, Y, body, timed, bounds, tiles, costs)
 
 
 def _share(
-    fill: Callable[[Any], bool],
+    fill: Callable[..., bool],
     shape: tuple[int, int],
     threads: int | None,
     poses: tuple[ArrayLike, ArrayLike],
 ) -> None:
     """Has the threads fill equal parts of the rows, or of the columns where these are more; refuses strange poses."""
+    from .kernels import Bounds, Tiles
+
     rows, columns = shape
     count = threads or (os.cpu_count() or 1 if rows * columns > THREADED else 1)
     cuts = [max(rows, columns) * i // count for i in range(count + 1)]
     parts = [(a, b) for a, b in pairwise(cuts) if b > a]
-    bounds = [(a, b, 0, columns) if rows >= columns else (0, rows, a, b) for a, b in parts]
+    bounds = [Bounds(a, b, 0, columns) if rows >= columns else Bounds(0, rows, a, b) for a, b in parts]
+    tiles = [Tiles.new() for _ in bounds]
     if len(bounds) == 1:
-        finite = fill(bounds[0])
+        finite = fill(bounds[0], tiles[0])
     else:
         with ThreadPoolExecutor(len(bounds)) as pool:
-            finite = all(list(pool.map(fill, bounds)))
+            finite = all(list(pool.map(fill, bounds, tiles)))
     if not finite:
-        _poses(poses[0], "starts")
-        _poses(poses[1], "goals")
+        finite_poses(poses[0], "starts")
+        finite_poses(poses[1], "goals")
 
 
 def _pairs(starts: ArrayLike, goals: ArrayLike) -> tuple[tuple[int, ...], tuple[int, int], Array, Array]:
     """The broadcast leading shape, the same as (n, m), and starts and goals as contiguous (n or 1, m or 1, 3)."""
-    X, Y = _shaped_poses(starts, "starts"), _shaped_poses(goals, "goals")
+    X, Y = shaped_poses(starts, "starts"), shaped_poses(goals, "goals")
     try:
         shape = np.broadcast_shapes(X.shape[:-1], Y.shape[:-1])
     except ValueError as error:

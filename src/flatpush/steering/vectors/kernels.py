@@ -7,13 +7,10 @@ import numba as nb
 import numpy as np
 from numba.extending import intrinsic
 
+from ...compiled import block
+
 TURN = 2 * math.pi
 SLACK = 2e-10  # an arc that falls short of zero by less than this is zero [rad]
-
-# LLVM inlines a block before it looks for vectors in the loop around it; numba's own inlining compiles more slowly.
-# The contraction to multiply-and-add is the only liberty with floats that is taken.
-block = nb.njit(forceinline=True, error_model="numpy", fastmath={"contract"})
-batch = nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 
 
 @intrinsic
@@ -46,18 +43,6 @@ def _small(a: float, b: float) -> float:
 @block
 def _large(a: float, b: float) -> float:
     return _select(a > b, a, b)
-
-
-@block
-def _angle(y: float, x: float) -> float:
-    """atan2, in [-π, π]; 0 for (0, 0)."""
-    large, small = _large(abs(x), abs(y)), _small(abs(x), abs(y))
-    far = small > 0.41421356237309503 * large  # beyond π/8: the distance from the diagonal instead
-    angle = _arctan(_select(far, small - large, small) / (_select(far, small + large, large) + 1e-300))
-    angle = _select(far, angle + 0.25 * math.pi, angle)
-    angle = _select(abs(y) > abs(x), 0.5 * math.pi - angle, angle)
-    angle = _select(x < 0.0, math.pi - angle, angle)
-    return _select(y < 0.0, -angle, angle)
 
 
 @block
