@@ -7,11 +7,18 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush.control.horizon.controller import HorizonController
+from flatpush.control.loop.closed_loop import drive
+from flatpush.control.loop.sensor import Camera, SimulatedSensor
 from flatpush.documents import parse_scene, scene_document
 from flatpush.documents.scene_digest import scene_differences, scene_digest
 from flatpush.errors import InputError
-from flatpush.planning.empty_table import direct_paths
+from flatpush.geometry import compose
+from flatpush.planning.empty_table import direct_paths, refined_paths
+from flatpush.planning.query import Query
+from flatpush.planning.refine.problem import Sequences
 from flatpush.problem import Planning, Workspace
+from flatpush.simulation.plant import Plant
 from flatpush.view import save_figure
 
 CUP = {
@@ -25,6 +32,12 @@ CUP = {
 
 def _cup(**changes) -> fp.Scene:
     return replace(parse_scene(CUP), **changes)
+
+
+@pytest.fixture(scope="module")
+def cup_plan() -> fp.Plan:
+    """With two fingers; its scene lists the pushes."""
+    return fp.plan(_cup(pusher=fp.Pusher(fingers=2, spacing=0.018)))
 
 
 def test_a_document_says_free():
@@ -90,16 +103,15 @@ def test_one_push_is_never_dearer_than_with_a_fixed_angle(fingers, cost):
     assert fp.simulate(found).final_pose[:2] == pytest.approx([0, 0], abs=1e-4 if fingers == 2 else 2e-3)
 
 
-def test_a_start_at_the_place_is_there_already():
-    plan = fp.plan(_cup(start=(0.001, 0.002, 3.0)))
+def test_a_start_at_the_place_is_there_already(cup_plan):
+    plan = fp.plan(replace(cup_plan.scene, start=(0.001, 0.002, 3.0)))
     assert (plan.status, plan.cost, plan.segments) == ("solved", 0.0, ())
 
 
-def test_a_plan_that_misses_the_place_fails():
+def test_a_plan_that_misses_the_place_fails(cup_plan):
     """The claim of the goal is recomputed for x and y: moving the goal by 1 mm must be noticed."""
-    plan = fp.plan(_cup(pusher=fp.Pusher(fingers=2, spacing=0.018)))
-    assert fp.verify(plan).ok
-    moved = replace(plan, scene=replace(plan.scene, goal=(0.002, 0.002, "free")))
+    assert fp.verify(cup_plan).ok
+    moved = replace(cup_plan, scene=replace(cup_plan.scene, goal=(0.002, 0.002, "free")))
     assert {"goal_error", "reaches the goal"} <= {claim.name for claim in fp.verify(moved).failed}
 
 
@@ -129,12 +141,60 @@ def test_among_obstacles_the_object_ends_as_it_fits():
         fp.plan(tight)
 
 
-def test_the_goal_is_drawn_without_a_heading(tmp_path):
+def test_the_goal_is_drawn_without_a_heading(cup_plan, tmp_path):
     """A fixed goal has a mark of how it is turned; a free one has one line less, and the same outlines."""
-    plan = fp.plan(_cup(pusher=fp.Pusher(fingers=2, spacing=0.018)))
-    fixed = replace(plan, scene=replace(plan.scene, goal=plan.goal_pose))
+    fixed = replace(cup_plan, scene=replace(cup_plan.scene, goal=cup_plan.goal_pose))
     strokes = []
-    for shown, name in ((plan, "free.svg"), (fixed, "fixed.svg")):
+    for shown, name in ((cup_plan, "free.svg"), (fixed, "fixed.svg")):
         save_figure(shown, tmp_path / name)
         strokes.append(len(re.findall(r"<(?:path|polyline|line)\b", (tmp_path / name).read_text())))
     assert strokes[0] == strokes[1] - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [(0.09, -0.05, 0.4), (-0.02, 0.12, 2.2)])
+def test_many_pushes_are_never_dearer_than_with_a_fixed_angle(start):
+    """A cup with the automatic pushes of two fingers; benchmarks/free_goal.py does the same for random starts."""
+    scene = _cup(start=start, pusher=fp.Pusher(fingers=2, spacing=0.018))
+    planner = fp.Planner(scene)
+
+    def cost(goal):
+        return list(refined_paths(replace(planner.scene, goal=goal), planner.fleet))[-1].cost
+
+    free = cost(scene.goal)
+    assert free <= min(cost((0.001, 0.002, angle)) for angle in np.arange(24) * (np.pi / 12)) + 1e-9
+    found = planner.plan()
+    assert found.cost == pytest.approx(free, abs=1e-9)
+    assert fp.verify(found).ok
+
+
+def test_the_descent_turns_the_end_to_where_nothing_is_gained(cup_plan):
+    """The best plan of many pushes, its end turned by a little either way, costs more: the angle is stationary."""
+    scene = cup_plan.scene
+    planner = fp.Planner(scene)
+    best = list(refined_paths(scene, planner.fleet))[-1]
+    assert len(best.path.pushes) > 1
+    end = best.path.poses[-1]
+    assert end[:2] == pytest.approx(scene.goal_pose[:2], abs=1e-12)
+    sequences = Sequences.of(Query(planner.fleet, scene.start_pose, end), 5e-3)
+    stretches = best.path.stretches
+    pushes = np.array([push for push, *_ in stretches])
+    for turn in (-1e-3, 1e-3):
+        poses = np.array(
+            [scene.start_pose, *(pose for *_, pose in stretches[:-1]), end + np.array([0, 0, turn])]
+        )
+        beside = sequences.descend(sequences.candidate(pushes, poses), 6, 80)
+        assert beside.cost > best.cost - 1e-9
+
+
+@pytest.mark.slow
+def test_the_horizon_controller_takes_it():
+    scene = _cup(start=(0.05, 0.0, 1.0), goal=(0.0, 0.0, "free"))
+    controller = HorizonController.of(scene)
+    plant = Plant(scene.object, [[0.0, 0.0]], scene.pusher.tip_radius)
+    hand = compose(scene.start_pose, [-0.1, 0.0, 0.0])
+    run = drive(
+        controller, plant, scene.start_pose, hand, SimulatedSensor(Camera(), np.random.default_rng(0)), 90.0
+    )
+    assert run.outcome.startswith("arrived"), run.outcome
+    assert np.hypot(*run.object[-1][:2]) < 0.002

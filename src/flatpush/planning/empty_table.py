@@ -45,11 +45,13 @@ def direct_paths(fleet: Fleet, start: Array, ends: Array) -> list[Path]:
 
 def refined_paths(scene: Scene, fleet: Fleet) -> Iterator[Found]:
     """Better and better paths of one or many pushes, within the scene's limits."""
+    goal = np.nan_to_num(scene.goal_pose)
     from .refine import improvements
 
     planning = scene.planning
     search = improvements(
-        Query(fleet, scene.start_pose, scene.goal_pose, robust=planning.robust), seed=planning.seed
+        Query(fleet, scene.start_pose, goal, free=scene.free_angle, robust=planning.robust),
+        seed=planning.seed,
     )
     began = clock()
     rounds = max(1, planning.iterations // ROUND)

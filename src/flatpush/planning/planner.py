@@ -154,7 +154,7 @@ class Planner:
         for path in singles[:1] if several else singles:
             yield Found(path, path.cost, dict(single))
         if several:
-            for found in refined_paths(replace(scene, goal=singles[0].poses[-1]), self.fleet):
+            for found in refined_paths(scene, self.fleet):
                 found.details.update(single)
                 yield found
 

@@ -41,6 +41,7 @@ class Query:
         room: clearance that a change of push needs [m]: what the hand takes to go around the object on the table, or
             0 if it is lifted.
         inside: whether a change of push needs room to turn the hand anyhow within the bounds.
+        free: whether the object may have any angle at the goal, whose own is then one of them.
         robust: whether a path is judged by what it costs when every switch pose is missed by a little and the next
             push is planned again (offsets), instead of by its own cost.
 
@@ -57,6 +58,7 @@ class Query:
     clearance: float = 0.0
     room: float = 0.0
     inside: bool = False
+    free: bool = False
     robust: bool = False
 
     def __post_init__(self) -> None:

@@ -19,7 +19,8 @@ def next_push(
 
     Args:
         cars: of the pushes; None where one cannot be steered.
-        pose, goal: X_WO. switching: what another landing costs [m]. seed: of the search.
+        pose, goal: X_WO; the goal's angle is NaN where any will do.
+        switching: what another landing costs [m]. seed: of the search.
     """
     usable = [k for k, car in enumerate(cars) if car is not None]
     if not usable:
@@ -37,7 +38,8 @@ def next_push(
         np.full((n, 3), np.inf),
         np.where(np.eye(n) > 0, 0.0, switching),
     )
-    *_, best = islice(improvements(Query(fleet, pose, goal), seed=seed), 2)
+    query = Query(fleet, pose, np.nan_to_num(goal), free=bool(np.isnan(goal[2])))
+    *_, best = islice(improvements(query, seed=seed), 2)
     i = int(best.pushes[0])
     weights = dict(zip("LSR", (radii[i], 1.0, radii[i]), strict=True))
     length = sum(weights[x] * float(a) for x, a in zip(best.words[0], best.amounts[0], strict=True))

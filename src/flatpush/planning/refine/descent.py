@@ -58,6 +58,7 @@ class Work(NamedTuple):
         legs: _lengths. short: whether a leg is held at the least length.
         phase: what a step is solved for, of one element.
         goal: with as many turns as the chain makes. least: length of a leg [m]. radius: the unit of length [m].
+        free: whether the chain may end with any angle: the condition of the angle and its multiplier are then zero.
     """
 
     now: Records
@@ -71,9 +72,10 @@ class Work(NamedTuple):
     goal: Array
     least: float
     radius: float
+    free: bool
 
     @classmethod
-    def of(cls, words: Records, poses: Array, least: float, radius: float) -> "Work":
+    def of(cls, words: Records, poses: Array, least: float, radius: float, free: bool = False) -> "Work":
         """For a plan with these words (six_words.WORD, shape (m,)) between poses (m + 1, 3)."""
         count = len(words)
         goal = poses[-1].copy()
@@ -83,7 +85,7 @@ class Work(NamedTuple):
         return cls(
             np.zeros(MOST + 1, ARC), np.zeros(MOST + 1, ARC), np.zeros(1, ARC), np.empty((size, size + 1)),
             np.zeros(3 + count), np.empty((count, 2)), np.zeros(count, np.bool_), np.zeros(1, np.int64), goal, least,
-            radius,
+            radius, free,
         )  # fmt: skip
 
 
@@ -196,7 +198,8 @@ def _solve(work: Work, arcs: Records, n: int, damping: float) -> float:
     """
     K, lam, legs, short, radius, phase = work.K, work.lam, work.legs, work.short, work.radius, work.phase[0]
     end, goal = arcs[n], work.goal
-    x, y, theta = goal[0] - end.x, goal[1] - end.y_W, (goal[2] - end.theta) * radius
+    x, y = goal[0] - end.x, goal[1] - end.y_W
+    theta, lever = (0.0, 0.0) if work.free else ((goal[2] - end.theta) * radius, radius)
     off = math.hypot(x, y) + abs(theta)
     _lengths(arcs, n, legs)
     m = 0
@@ -216,7 +219,7 @@ def _solve(work: Work, arcs: Records, n: int, damping: float) -> float:
         arc.step = 0.0
         if arc.bound:
             continue
-        K[m, a], K[m + 1, a], K[m + 2, a] = arc.end_x, arc.end_y, arc.kappa * radius
+        K[m, a], K[m + 1, a], K[m + 2, a] = arc.end_x, arc.end_y, arc.kappa * lever
         if phase != CLOSING:
             K[a, size] = -arc.gradient
         b = a
@@ -340,7 +343,7 @@ def _take_in(
 
 @kernel(lent=True)
 def descend(work: Work, cars: Records, pushes: np.ndarray, words: Records, poses: Array, steps: int) -> bool:
-    """One descent from the words of the legs; sets the inner poses. False if the goal or the lengths cannot be met."""
+    """One descent from the words of the legs; sets the inner poses and a free last angle. False: it cannot end well."""
     now, trial, legs, short, radius = work.now, work.trial, work.legs, work.short, work.radius
     n = 3 * len(pushes)
     for i in range(len(pushes)):
@@ -423,4 +426,6 @@ def descend(work: Work, cars: Records, pushes: np.ndarray, words: Records, poses
         while k < n and now[k].leg < i:
             k += 1
         poses[i, 0], poses[i, 1], poses[i, 2] = now[k].x, now[k].y_W, now[k].theta
+    if work.free:
+        poses[len(pushes), 2] = now[n].theta
     return True

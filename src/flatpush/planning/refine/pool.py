@@ -30,9 +30,9 @@ def sample_poses(sequences: Sequences, rng: np.random.Generator, count: int, nea
     free = count - local - driven
     parts = [np.column_stack([rng.uniform(low, high, (free, 2)), rng.uniform(-np.pi, np.pi, free)])]
     half = driven // 2
-    for origin, sense, size in ((start, 1.0, half), (goal, -1.0, driven - half)):
+    for origins, sense, size in ((start[None], 1.0, half), (sequences.ends, -1.0, driven - half)):
         pushes = rng.integers(fleet.size, size=size)
-        poses = np.broadcast_to(origin, (size, 3))
+        poses = origins[np.arange(size) % len(origins)]
         for _ in range(2):
             poses = compose(poses, exp(sense * _arcs(sequences, rng, pushes)))
         parts.append(poses)
@@ -50,7 +50,9 @@ def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]
     if k < 2 or legs < 2:
         return []
     first = sequences.table(sequences.start[None], poses)[:, 0, :]  # (k, m)
-    last = sequences.table(poses, sequences.goal[None])[:, :, 0]
+    every = sequences.table(poses, sequences.ends)  # (k, m, e)
+    nearest = np.argmin(every, axis=2)  # the end that each push best goes to
+    last = np.take_along_axis(every, nearest[..., None], axis=2)[..., 0]
     found: list[Choice] = []
     pairs = _pairs(sigma)
     for i, j in pairs:
@@ -90,7 +92,11 @@ def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]
         chosen += _keep(three, 3) + _keep(four, 4)
     seeds = [
         Candidate(
-            cost, np.array(pushes), np.concatenate([[sequences.start], poses[list(via)], [sequences.goal]])
+            cost,
+            np.array(pushes),
+            np.concatenate(
+                [[sequences.start], poses[list(via)], sequences.ends[[nearest[pushes[-1], via[-1]]]]]
+            ),
         )
         for cost, pushes, via in chosen
     ]
@@ -110,6 +116,11 @@ def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> li
     prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
     pushes = rng.integers(k, size=prefixes)
     starts = compose(sequences.start, exp(_arcs(sequences, rng, pushes)))
+    ends = sequences.ends[
+        np.zeros(prefixes, int)
+        if len(sequences.ends) == 1
+        else rng.integers(len(sequences.ends), size=prefixes)
+    ]
     found: list[tuple[float, tuple[int, ...], Array]] = []
     costs, poses = np.empty(k**3), np.empty((k**3, 2, 3))
     for prefix in range(-1 if plain else 0, prefixes):
@@ -120,19 +131,18 @@ def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> li
             if prefix < 0
             else sequences.candidate(pushes[[prefix]], np.array([sequences.start, start])).cost
         )
-        three_arcs(sequences.cars, switching, start, sequences.goal, costs, poses)
+        end = sequences.ends[0] if prefix < 0 else ends[prefix]
+        three_arcs(sequences.cars, switching, start, end, costs, poses)
         for triple in np.argsort(costs)[: ARC_SEEDS if prefix < 0 else 4]:
             i, j, h = triple // (k * k), triple // k % k, triple % k
             cost = before + costs[triple] + (fleet.switching[first[0], i] if first else 0.0)
             if np.isfinite(cost):
-                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[triple]])
+                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[triple], [end]])
                 found.append((float(cost), (*first, int(i), int(j), int(h)), via))
     found.sort(key=lambda plan: plan[0])
     seeds: dict[tuple[int, ...], Candidate] = {}
     for _, sequence, via in found[: 2 * ARC_SEEDS]:
-        seed = sequences.merged(
-            np.array(sequence), np.concatenate([[sequences.start], via, [sequences.goal]])
-        )
+        seed = sequences.merged(np.array(sequence), np.concatenate([[sequences.start], via]))
         if seed.key not in seeds:
             seeds[seed.key] = seed
     return list(seeds.values())[:ARC_SEEDS]

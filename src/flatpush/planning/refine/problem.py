@@ -9,10 +9,12 @@ from ...errors import InputError
 from ...geometry.pose import Array
 from ...steering import dubins
 from ...steering.fleet import Fleet
+from ...steering.free_heading import cheapest_headings
 from ...steering.six_words import WORD, Records, chain_cost
 from ..query import Query, offsets
 from .descent import Work, descend
 
+ANGLES = 24  # at a goal with a free angle, that seeds end with; the descent moves on from them
 SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
@@ -40,7 +42,8 @@ class Sequences:
     """What sequences of pushes from the start to the goal of a query cost on an empty table.
 
     Attributes:
-        fleet, start, goal: of the query.
+        fleet, start, goal, free: of the query.
+        ends: where plans may end, shape (e, 3): the goal alone, or with several angles where any will do.
         least: that the flat path of each leg of a plan with several pushes is long [m].
         cars: the fleet as records; changes: its switching costs; flat: whether all are Dubins cars.
         offsets: displacements of the switch poses for the cost of replanning, shape (16, 3).
@@ -49,6 +52,8 @@ class Sequences:
     fleet: Fleet
     start: Array
     goal: Array
+    free: bool
+    ends: Array
     least: float
     cars: Records
     changes: list[list[float]]
@@ -62,8 +67,8 @@ class Sequences:
             raise InputError("the least length of a leg is 0 or more", value=least)
         fleet = query.fleet
         return cls(
-            fleet, query.start, query.goal, float(least), fleet.cars, fleet.switching.tolist(), offsets(),
-            fleet.is_dubins,
+            fleet, query.start, query.goal, query.free, _ends(query), float(least), fleet.cars,
+            fleet.switching.tolist(), offsets(), fleet.is_dubins,
         )  # fmt: skip
 
     def switching(self, pushes: np.ndarray) -> float:
@@ -93,9 +98,13 @@ class Sequences:
 
     def direct(self) -> Candidate:
         """The best single push."""
-        ends = np.array([self.start, self.goal])
+        ends = self.ends[: self.fleet.size if self.free else 1]
         return min(
-            (self.candidate(np.array([k]), ends) for k in range(self.fleet.size)),
+            (
+                self.candidate(np.array([k]), np.array([self.start, end]))
+                for k in range(self.fleet.size)
+                for end in ends
+            ),
             key=lambda found: found.cost,
         )
 
@@ -112,7 +121,7 @@ class Sequences:
                 best, poses = cost, here.copy()
             if repeat == repeats or (best < np.inf and not better):
                 break
-            work = Work.of(words, here, self.least, float(self.fleet.radius[pushes[0]]))
+            work = Work.of(words, here, self.least, float(self.fleet.radius[pushes[0]]), self.free)
             if not descend(work, self.cars, pushes, words, here, steps):
                 break
         return Candidate(best + self.switching(pushes), pushes, poses)
@@ -160,3 +169,12 @@ class Sequences:
         return np.column_stack(
             [poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2] + self.fleet.heading[push]]
         )
+
+
+def _ends(query: Query) -> Array:
+    """The goal; or, where any angle will do, with the best one of every single push first, and then all around."""
+    if not query.free:
+        return query.goal[None]
+    _, headings = cheapest_headings(query.fleet, query.start, query.goal[:2])
+    angles = np.concatenate([headings[:, 0], np.arange(ANGLES) * (2 * np.pi / ANGLES)])
+    return np.column_stack([np.tile(query.goal[:2], (len(angles), 1)), angles])

@@ -1,0 +1,50 @@
+"""Goals with a free angle against the best of 72 fixed ones: python benchmarks/free_goal.py [N] [FINGERS] [SEED]
+
+A disc of 80 mm, automatic pushes, random starts. Prints the cost of the free goal, the least of the 72, and
+the CPU time of the search for the free goal in that for one fixed angle (a first start compiles and is left out).
+"""
+
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+
+import flatpush as fp
+from flatpush.geometry import Outline
+from flatpush.planning.empty_table import refined_paths
+
+ANGLES = np.arange(72) * (np.pi / 36)
+
+
+def main(n: int = 5, fingers: int = 2, seed: int = 0) -> None:
+    rng = np.random.default_rng(seed)
+    disc = fp.Object(Outline.circle(0.04), friction=0.3)
+    pusher = fp.Pusher(fingers=2, spacing=0.018) if fingers == 2 else fp.Pusher()
+    worst, ratios = -np.inf, []
+    for k in range(n + 1):
+        start = (*rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi))
+        planner = fp.Planner(fp.Scene(disc, start, (0, 0, "free"), pusher))
+
+        def searched(goal: object, planner: fp.Planner = planner) -> tuple[float, float]:
+            began = time.process_time()
+            *_, last = refined_paths(replace(planner.scene, goal=goal), planner.fleet)
+            return last.cost, time.process_time() - began
+
+        free, own = searched((0, 0, "free"))
+        if k == 0:
+            continue
+        fixed = [searched((0, 0, angle)) for angle in ANGLES]
+        best, typical = min(cost for cost, _ in fixed), float(np.median([spent for _, spent in fixed]))
+        worst, ratios = max(worst, free / best - 1), [*ratios, own / typical]
+        print(
+            f"free {1000 * free:.3f} mm, best of 72 {1000 * best:.3f} mm, time ratio {ratios[-1]:.2f}",
+            flush=True,
+        )
+    print(
+        f"{n} starts: dearest by {100 * worst:.4f} %, time ratio {np.median(ratios):.2f} (at most {max(ratios):.2f})"
+    )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
