@@ -40,5 +40,7 @@ class MissingExtra(FlatpushError, ImportError):
 
 
 def _short(value: object, most: int = 80) -> str:
-    text = repr(value)
+    # Arrays and numpy's numbers are shown as plain lists and numbers.
+    plain = getattr(value, "tolist", None)
+    text = repr(value if plain is None else plain())
     return text if len(text) <= most else text[: most - 1] + "…"

@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
 
 def command(
-    scene: Annotated[Path, typer.Argument(help="Scene document, YAML or JSON.")],
-    figure: Annotated[Path | None, typer.Option(help="Draw cones and turning centres: .svg or .png.")] = None,
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene document, YAML or JSON.")],
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw cones and turning centres as .svg or .png.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""

@@ -13,19 +13,30 @@ MODELS = ("auto", "ellipsoid", "quartic")
 
 def command(
     data: Annotated[
-        list[Path], typer.Argument(help="CSV files of wrenches and twists; columns fx,fy,tau,vx,vy,omega.")
+        list[Path],
+        typer.Argument(
+            metavar="DATA…", help="CSV files of wrenches and twists; columns fx,fy,tau,vx,vy,omega."
+        ),
     ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Write the surface here, for a scene's surface: {file: …}."),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write the surface here, for a scene's surface: {file: …}."
+        ),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Draw the surface with the data, or the comparison: .svg or .png.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the surface with the data, or the comparison: .svg or .png."),
     ] = None,
     model: Annotated[
-        str, typer.Option(help="Written and drawn: auto (the better one), ellipsoid or quartic.")
+        str,
+        typer.Option(
+            metavar="MODEL", help="Write and draw this one: auto (the better one), ellipsoid or quartic."
+        ),
     ] = "auto",
-    scene: Annotated[Path | None, typer.Option(help="Also fit the loads on this scene's support.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(metavar="SCENE", help="Also fit the loads on this scene's support.")
+    ] = None,
     pool: Annotated[bool, typer.Option("--pool", help="One surface for all experiments together.")] = False,
     units: Annotated[
         str, typer.Option(help="Of columns without a unit in their name: m, cm or mm, and rad or deg.")
@@ -33,7 +44,7 @@ def command(
     length: Annotated[
         float | None, typer.Option(help="Characteristic length [m] of the angles; default: from the data.")
     ] = None,
-    folds: Annotated[int, typer.Option(help="Parts of the cross-validation.")] = 5,
+    folds: Annotated[int, typer.Option(metavar="N", help="Parts of the cross-validation.")] = 5,
     seeds: Annotated[int, typer.Option(help="How many cross-validations, each shuffled anew.")] = 2,
     skip_bad: Annotated[
         bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")

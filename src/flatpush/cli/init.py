@@ -10,7 +10,9 @@ from .common import print_json
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="Scene document to write.")] = Path("scene.yaml"),
+    file: Annotated[Path, typer.Argument(metavar="[SCENE]", help="The scene document to write.")] = Path(
+        "scene.yaml"
+    ),
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> int:
     """Write a commented scene."""

@@ -1,6 +1,7 @@
 """flatpush plan: plans, verifies, writes."""
 
 import math
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,20 +11,46 @@ import typer
 
 from .common import cost_text, error_text, goal_values, growth_text, numbers, pose_text, print_json, telling
 
+LINES = 3  # of the reason why there is no plan
+
 
 def command(
-    scene: Annotated[Path, typer.Argument(help="Scene document, YAML or JSON.")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write the plan here (JSON).")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Draw it: .svg, .png, .gif or .html.")] = None,
-    snapshots: Annotated[
-        Path | None, typer.Option(help="Draw moments of it side by side: .svg or .png.")
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene document, YAML or JSON.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="PLAN", help="Write the plan here (JSON).")
     ] = None,
-    start: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
-    goal: Annotated[str | None, typer.Option(help="x,y,θ in the scene's units.", metavar="X,Y,θ")] = None,
-    model: Annotated[str | None, typer.Option(help="exact, ellipsoid, local or quartic.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the anytime search.")] = None,
-    iterations: Annotated[int | None, typer.Option(help="The anytime search stops here.")] = None,
-    time_limit: Annotated[float | None, typer.Option(help="Seconds; only cuts the search short.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the plan as .svg, .png, .gif or .html.")
+    ] = None,
+    snapshots: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw moments of the plan side by side as .svg or .png."),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="X,Y,θ", help="Start here instead, in the scene's units.")
+    ] = None,
+    goal: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,θ", help="Go here instead, in the scene's units; X,Y,free for any angle."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL", help="Plan with this model of friction: exact, ellipsoid, local or quartic."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(metavar="N", help="Seed the random search with this number.")
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(metavar="N", help="Stop the search after so many iterations.")
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Cut the search short after this time.")
+    ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="If there is no plan, tell why for each push, one line each.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
@@ -58,7 +85,7 @@ def command(
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))
-        typer.echo(f"no plan: {found.reason}", err=True)
+        typer.echo("\n".join(reason_lines(found.reason, verbose)), err=True)
         return 3
     report = verify(found)
     if not report.ok:
@@ -86,6 +113,15 @@ def command(
         return 0
     _tell(found, (output, figure, snapshots))
     return 0
+
+
+def reason_lines(reason: str, verbose: bool) -> list[str]:
+    """Why there is no plan: three lines at most, or with verbose one for each push."""
+    first, *others = [part for part in re.split(r" · |\n", reason) if part]
+    lines = [f"no plan: {first}", *(f"  {other}" for other in others)]
+    if verbose or len(lines) <= LINES:
+        return lines
+    return [*lines[: LINES - 1], f"  and {len(lines) - LINES + 1} more, which --verbose or --json tells"]
 
 
 def _planned(scene: Any) -> tuple[Any, Any]:
@@ -135,6 +171,11 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
         f"cost {cost_text(plan.cost, scene.planning.cost)} ({scene.planning.cost}), {plan.duration:.1f} s,"
         f" planned in {plan.run['planning_time']:.2f} s with the {scene.planning.model} model"
     )
+    if plan.run.get("stopped_by") == "time_limit":
+        typer.echo(
+            f"stopped by time_limit ({scene.planning.time_limit:g} s) before {scene.planning.iterations} iterations:"
+            " with --time-limit it would go on for cheaper plans"
+        )
     single, before = plan.run.get("single_cost"), plan.run.get("cost_before_refinement")
     if single is not None and before is not None:
         kind = scene.planning.cost

@@ -9,9 +9,10 @@ from .common import print_json, tell_failed, telling
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
     scene: Annotated[
-        Path | None, typer.Option(help="The scene that you trust; every difference from it is named.")
+        Path | None,
+        typer.Option(metavar="SCENE", help="Name every difference from this scene, which you trust."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> int:

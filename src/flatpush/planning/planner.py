@@ -110,7 +110,7 @@ class Planner:
             yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return
         if not self.usable:
-            reason = f"no push can steer the object. {_listed(self.reasons)}"
+            reason = f"no push can steer the object.\n{_listed(self.reasons)}"
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
         best, stopped_by, details = np.inf, "", dict[str, Any]()
@@ -138,7 +138,13 @@ class Planner:
         if stopped_by == "time_limit":
             details["stopped_by"] = stopped_by  # of the last answer, whose plan is yet to be made
         if np.isinf(best):
-            yield Answer(np.inf, partial(_none, scene, blocked + _listed(reasons), began))
+            if stopped_by == "time_limit":
+                limit = (
+                    f"stopped by time_limit after {scene.planning.time_limit:g} s; more time may find a plan."
+                )
+                blocked = f"{limit}\n{blocked}"
+            lines = (blocked.strip(), _listed(reasons))
+            yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
 
     @property
     def explored(self) -> Array | None:
@@ -212,7 +218,7 @@ def _crowded(scene: Scene) -> bool:
 
 
 def _listed(reasons: dict[str, str]) -> str:
-    return " · ".join(f"{name}: {reason}" for name, reason in reasons.items())
+    return "\n".join(f"{name}: {reason}" for name, reason in reasons.items())
 
 
 def _solved(scene: Scene, segments: Segments, began: float, found: dict[str, Any]) -> Plan:
