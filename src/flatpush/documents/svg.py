@@ -36,7 +36,7 @@ _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 # What is visible and is no line of the object, with the word for it.
 _ASIDE = {"text": "text", "flowRoot": "text", "image": "a picture"}
 _MOVING = ("animate", "animateTransform", "animateMotion", "set")
-_MOST_NESTED, _MOST_ELEMENTS = 60, 200_000
+_MOST_NESTED, _MOST_ELEMENTS, _MOST_REUSED = 60, 200_000, 20_000
 _WHITE = ("white", "#fff", "#ffffff", "rgb(255,255,255)")
 
 
@@ -108,7 +108,7 @@ class _Reader:
         self.drawing = Drawing()
         self.ids: dict[str, Element] = {}
         self.rules: list[Rule] = []
-        self.count = 0
+        self.count = self.reused = 0
         self.real: str = ""  # places of shapes with lengths in real units, and of those without
         self.bare: str = ""
 
@@ -140,9 +140,11 @@ class _Reader:
 
     def visit(self, element: Element, state: _State, page: bool = False) -> None:
         self.count += 1
-        if self.count > _MOST_ELEMENTS or len(state.used) > _MOST_NESTED:
+        self.reused += bool(state.used)
+        if self.count > _MOST_ELEMENTS or self.reused > _MOST_REUSED or len(state.used) > _MOST_NESTED:
             raise InputError(
-                f"the drawing has at most {_MOST_ELEMENTS} parts, {_MOST_NESTED} levels of reuse"
+                f"the drawing has at most {_MOST_ELEMENTS} parts, {_MOST_REUSED} of them reused,"
+                f" and {_MOST_NESTED} levels of reuse"
             )
         tag = element.tag
         if tag not in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use", "foreignObject"):

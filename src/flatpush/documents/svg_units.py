@@ -118,6 +118,8 @@ def _function(name: str, words: list[str], css: bool, text: str) -> Array:
         if match is None:
             raise bad()
         value, unit = float(match[1]), match[2].lower()
+        if unit and not css:  # units are for style sheets; a browser ignores the whole attribute
+            raise bad()
         if angle and unit in _ANGLES:
             return value * _ANGLES[unit]
         if scale and unit == "%":
