@@ -7,6 +7,7 @@ import pytest
 
 from flatpush.control.horizon.controller import HorizonController
 from flatpush.control.laws.formulas import AxisGains, Bounds, FlatPose, FlatTarget, along_path, linearised
+from flatpush.control.learning.belief import Place, SteeringBelief, _signal
 from flatpush.control.loop.limits import Limits, braking
 from flatpush.control.loop.measurement import STOP, Command, Measurement
 from flatpush.experiments.feedback import task
@@ -85,3 +86,29 @@ def test_a_finger_more_than_seven_tenths_of_a_millimetre_off_the_edge_has_lost_i
     )  # fmt: skip
     after, _ = controller.act(state, 1.01)
     assert after.phase == phase
+
+
+def test_of_the_moments_the_signal_is_what_is_left_when_the_noise_is_taken_off():
+    """Signals and noise along four directions, mixed by a matrix: a direction of nothing but noise carries none."""
+    mix = np.random.default_rng(4).normal(size=(4, 4))
+    signal, noise = np.diag([4.0, 2.0, 0.5, 0.0]), np.diag([1.0, 0.9, 0.25, 1.0])
+    found, taken = _signal(mix @ (signal + noise) @ mix.T, mix @ noise @ mix.T, 1e6)
+    np.testing.assert_allclose(found, mix @ signal @ mix.T, atol=1e-9)
+    np.testing.assert_allclose(taken, mix @ np.diag([1.0, 0.9, 0.25, 0.0]) @ mix.T, atol=1e-9)
+
+
+def test_what_is_learned_is_as_uncertain_as_signal_and_noise_make_it():
+    """Moments whose null vector is (c_x, c_y, m, 1), almost no prior: the estimate is that vector, and with the weight
+    w the covariance S⁻¹ (S + T) S⁻¹ / w, where T is the noise along the directions that carry a signal."""
+    mix = np.random.default_rng(4).normal(size=(4, 4))
+    signal, noise = np.diag([4.0, 2.0, 0.5, 0.0]), np.diag([1.0, 0.9, 0.25, 1.0])
+    null = np.linalg.solve(mix.T, [0.0, 0.0, 0.0, 1.0])
+    null = null / null[3]
+    S, N = mix @ signal @ mix.T, mix @ noise @ mix.T
+    belief = SteeringBelief((Place(np.zeros(2), S + N, N, 1e6),), 1e-9 * np.eye(3), null[:3], 1)
+    found = belief.estimate()
+    np.testing.assert_allclose([*found.cof, found.moment], null[:3], rtol=1e-6)
+    T = (mix @ np.diag([1.0, 0.9, 0.25, 0.0]) @ mix.T)[:3, :3]
+    inverse = np.linalg.inv(S[:3, :3])
+    w = 1e6 / (null @ N @ null)
+    np.testing.assert_allclose(found.covariance, inverse @ (S[:3, :3] + T) @ inverse / w, rtol=1e-6)

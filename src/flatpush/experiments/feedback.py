@@ -15,11 +15,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..control import AbstractController, Camera, SimulatedSensor
+from ..control import AbstractController, Camera, ControllerState, SimulatedSensor
 from ..control.horizon.controller import HorizonController
 from ..control.loop.closed_loop import ClosedLoopRun, drive
 from ..control.tracking.plan_controller import PlanController
@@ -163,7 +164,7 @@ class DisturbedPlant(Plant):
         self.kind, self.after, self.side = kind, after, side
         self.pushed, self.left = 0.0, LOST
 
-    def step(self, state: PlantState, velocity: Any, dt: float) -> PlantState:
+    def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
         touching = state.modes[0] not in ("separation", "rest")
         self.pushed += dt if touching else 0.0
         if not self.kind or self.pushed < self.after or self.left <= 0 or not (touching or self.left < LOST):
@@ -205,7 +206,7 @@ def attempt(
     hand = compose(scene.start_pose, [-2 * scene.object.outline.size, 0.0, 0.0])
     landings = 0
 
-    def told(time: float, state: Any) -> None:
+    def told(time: float, state: ControllerState) -> None:
         nonlocal landings
         landings = max(landings, getattr(state, "landings", 1))
 
