@@ -46,8 +46,10 @@ def test_braking_ends_at_the_end_with_no_more_than_the_deceleration():
 def test_whatever_is_wanted_the_limits_hold():
     limits = Limits(np.array([[0.0, 0.009], [0.0, -0.009]]), 0.02, 0.1, np.pi / 2, 0.1, 0.5)
     rng, dt, yaw, last, before = np.random.default_rng(0), 1 / 60, 0.0, STOP, np.zeros((2, 2))
-    for _ in range(300):
-        wanted = Command(rng.normal(size=3) * [0.05, 0.05, 3.0])
+    for k in range(300):
+        # Anything, and turning on the spot for a while, which the turn rate bounds before the fingertips do.
+        spinning = Command(np.array([0.0, 0.0, 9.0]))
+        wanted = Command(rng.normal(size=3) * [0.05, 0.05, 3.0]) if k % 100 < 50 else spinning
         last = limits.kept(last, 0.0, wanted, yaw, dt)
         tips = limits.tip_velocities(last.velocity, yaw)
         assert np.max(np.hypot(*tips.T)) <= 0.02
