@@ -17,16 +17,16 @@ from flatpush.testing import check_robot
 
 
 @pytest.fixture(scope="module")
-def short_plan(three_feet):
+def short_plan(triangle):
     pusher = fp.Pusher(fingers=2, spacing=0.018)
-    pushes = (fp.Push("long edge", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
-    return fp.plan(fp.Scene(three_feet, (-0.02, -0.04, 0.2), pusher=pusher, pushes=pushes))
+    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
+    return fp.plan(fp.Scene(triangle, (-0.02, -0.05, 0.2), pusher=pusher, pushes=pushes))
 
 
-def test_every_foot_carries_its_share(short_plan):
-    mujoco = load()
-    thing, tips = short_plan.scene.object, short_plan.pushes[0].fingers
-    model = mujoco.MjModel.from_xml_string(cell_xml(short_plan.scene, tips, Physics(0.3)))
+def test_every_foot_carries_its_share(three_feet):
+    mujoco, thing = load(), three_feet
+    scene = fp.Scene(three_feet, (0.0, 0.0, 0.0), pusher=fp.Pusher(lift=0.03))
+    model = mujoco.MjModel.from_xml_string(cell_xml(scene, np.array([[0.0, 0.009]]), Physics(0.3)))
     data = mujoco.MjData(model)
     data.qpos[-2] = data.ctrl[-2] = 0.03  # the fingers are up
     mujoco.mj_step(model, data, 500)
@@ -40,7 +40,7 @@ def test_every_foot_carries_its_share(short_plan):
     assert len(found) == len(places)
     for place, weight in zip(places, weights, strict=True):
         assert found[tuple(np.round(place, 6))] == pytest.approx(0.98 * MASS * 9.81 * weight, rel=1e-3)
-    high = 0.6 * short_plan.scene.pusher.lift
+    high = 0.6 * 0.03
     assert model.geom("floor").pos[2] == pytest.approx(-high / 2 - 0.001)
 
 

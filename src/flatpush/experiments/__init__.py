@@ -11,6 +11,10 @@ from ..errors import InputError
 EXPERIMENTS = {
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
     "fig4": "feedback linearisation of a single-finger push, and what its numbers mean (paper, Fig. 4)",
+    "fig6": "two fingers on a robot, in the physics cell: a rectangle on three feet (paper, Fig. 6; --runs, --seed)",
+    "fig7": "the same with a rectangle on its edge (paper, Fig. 7)",
+    "fig8": "the same with a butterfly (paper, Fig. 8)",
+    "fig9": "the same with a triangle (paper, Fig. 9)",
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
     "cone": "two fingers with their composite cone against their virtual middle contact",
@@ -21,7 +25,9 @@ EXPERIMENTS = {
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
 }
 # Those that take a number of runs and a seed.
-RANDOM = {"feedback"}
+RANDOM = {"feedback", "fig6", "fig7", "fig8", "fig9"}
+# Those that one file holds together.
+TOGETHER = dict.fromkeys(("fig6", "fig7", "fig8", "fig9"), "robot_runs")
 # Those that take a range of seeds.
 SEEDED = {"push-t"}
 # Those that need the folder of recorded data.
@@ -50,7 +56,10 @@ def experiment(
         raise InputError(
             "there is no such experiment", value=name, hint=f"There are: {', '.join(sorted(EXPERIMENTS))}."
         )
-    run: Callable[..., str] = import_module(f"flatpush.experiments.{name.replace('-', '_')}").run
+    module = TOGETHER.get(name, name.replace("-", "_"))
+    run: Callable[..., str] = import_module(f"flatpush.experiments.{module}").run
+    if name in TOGETHER:
+        run = partial(run, figure=name)
     if runs is not None and runs < 1:
         raise InputError("there is at least one run", key="runs", value=runs)
     if seed is not None and seed < 0:

@@ -8,6 +8,7 @@ from ...friction.patches import patches
 from ...geometry import Outline
 from ...geometry.pose import Array
 from ...problem import Scene
+from .irb120 import Irb120
 
 # The object is so high, but at most this share of the lift [m]; fingertips are balls at half of that.
 HEIGHT, OF_LIFT = 0.02, 0.6
@@ -16,6 +17,7 @@ FOOT = 0.001  # radius of a foot [m]
 FEET = 8  # about so many for a spread pressure, and those at its rim
 TABLE = 0.3  # friction between feet and table
 TIP_MASS = 0.3  # of a finger [kg]
+STEM = 0.08  # length of a finger [m]
 # Of the tool's drives: stiffness [N/m] and damping [N s/m]; of the turning drive by LEVER² [N m/rad].
 STIFFNESS, DAMPING, LEVER = 4e4, 400.0, 0.03
 STEP = 0.001  # [s]
@@ -47,7 +49,7 @@ def height_of(scene: Scene) -> float:
     return min(HEIGHT, OF_LIFT * scene.pusher.lift)
 
 
-def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
+def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Irb120 | None = None) -> str:
     """The model: joints object-x, -y, -turn, a slide for each foot, and tool-x, -y, -z, -turn, in this order.
 
     The object moves in the plane. Every foot slides up and down on its own and carries exactly its own weight, so
@@ -55,6 +57,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
 
     Args:
         tips: of the fingertips in E, shape (k, 2).
+        arm: holds the tool; its six joints stand in the place of the tool's.
     """
     thing, high = scene.object, height_of(scene)
     places, loads, *_ = patches(thing.support.pressure, physics.feet)
@@ -69,7 +72,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
     fingers = "".join(
         f'<geom name="tip{i}" type="sphere" size="{radius}" mass="{TIP_MASS}" rgba="0.2 0.2 0.25 1"'
         f' pos="{x:.9g} {y:.9g} 0" {_SHY}/>'
-        f'<geom type="capsule" size="{radius}" fromto="{x:.9g} {y:.9g} 0 {x:.9g} {y:.9g} 0.08" mass="0"'
+        f'<geom type="capsule" size="{radius}" fromto="{x:.9g} {y:.9g} 0 {x:.9g} {y:.9g} {STEM}" mass="0"'
         f' rgba="0.6 0.6 0.65 1" {_SHY}/>'
         for i, (x, y) in enumerate(tips + np.array(physics.tool))
     )
@@ -81,6 +84,11 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
         f'<position joint="tool-{axis}" kp="{STIFFNESS * scale:g}" kv="{DAMPING * scale:g}"/>'
         for axis, scale in (("x", 1.0), ("y", 1.0), ("z", 1.0), ("turn", LEVER**2))
     )
+    holder = f"""<body name="tool" gravcomp="1"><joint name="tool-x" type="slide" axis="1 0 0"/>
+<joint name="tool-y" type="slide" axis="0 1 0"/><joint name="tool-z" type="slide" axis="0 0 1"/>
+<joint name="tool-turn" type="hinge" axis="0 0 1"/>{fingers}</body>"""
+    if arm is not None:
+        holder, drives = arm.model(fingers, -high / 2 - FOOT)
     cx, cy = thing.cof
     return f"""<mujoco model="flatpush cell">
 <compiler boundmass="1e-9" boundinertia="1e-9"/>
@@ -95,9 +103,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics) -> str:
 <body name="object"><joint name="object-x" type="slide" axis="1 0 0"/><joint name="object-y" type="slide" axis="0 1 0"/>
 <joint name="object-turn" type="hinge" axis="0 0 1"/>
 <inertial pos="{cx:.9g} {cy:.9g} 0" mass="{BODY * MASS}" diaginertia="1e-6 1e-6 1e-6"/>{sides}{feet}</body>
-<body name="tool" gravcomp="1"><joint name="tool-x" type="slide" axis="1 0 0"/>
-<joint name="tool-y" type="slide" axis="0 1 0"/><joint name="tool-z" type="slide" axis="0 0 1"/>
-<joint name="tool-turn" type="hinge" axis="0 0 1"/>{fingers}</body>
+{holder}
 </worldbody>
 <contact>{floor}{touch}</contact><actuator>{drives}</actuator>
 </mujoco>"""

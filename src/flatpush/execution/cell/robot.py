@@ -1,6 +1,8 @@
 """A tool in the physics cell: its drives follow the targets, its fingers push the object, MuJoCo decides the rest."""
 
+import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -13,7 +15,8 @@ from ...problem import Plan
 from ..addresses import Address
 from ..robot import Limits, RobotFault, State
 from ..simulated import DryRun, Unknown, home_of
-from .model import DAMPING, STEP, STIFFNESS, Physics, cell_xml, height_of
+from .irb120 import Irb120
+from .model import DAMPING, FOOT, STEP, STIFFNESS, Physics, cell_xml, height_of
 
 LIMITS = Limits(period=0.004, deviation=0.005)
 # The joints at the beginning are the object's, those at the end the tool's.
@@ -43,6 +46,7 @@ class CellRobot(DryRun):
 
     Args:
         plan: whose object and fingers it has. unknown: in what they differ. table: friction of the feet.
+        arm: that holds the tool; None: drives along x, y, z and about z.
         home: of the tool. limits: what may be asked for.
 
     Raises:
@@ -56,12 +60,17 @@ class CellRobot(DryRun):
         unknown: Unknown | None = None,
         *,
         table: float | None = None,
+        arm: Irb120 | None = None,
         home: ArrayLike | None = None,
         limits: Limits = LIMITS,
     ) -> None:
-        super().__init__(home_of(plan) if home is None else home, limits)
-        self._mujoco = load()
         unknown, scene = unknown or Unknown(), plan.scene
+        if arm is not None:
+            # Heights of E count from the middle of the object, which is above the table.
+            arm = replace(arm, height=height_of(scene) / 2 + FOOT)
+            limits = replace(limits, unreachable=arm.unreachable)
+        super().__init__(home_of(plan) if home is None else home, limits)
+        self._mujoco, self._arm = load(), arm
         if height_of(scene) / 2 + scene.pusher.lift - scene.pusher.tip_radius < height_of(scene):
             raise InputError(
                 "the fingertips do not pass over the object", key="pusher.lift", value=scene.pusher.lift
@@ -72,12 +81,18 @@ class CellRobot(DryRun):
         physics = Physics(friction, tool=(float(tool[0]), float(tool[1])))
         if table is not None:
             physics = Physics(friction, table, physics.tool)
-        self._model = self._mujoco.MjModel.from_xml_string(cell_xml(scene, plan.pushes[0].fingers, physics))
+        self._model = self._mujoco.MjModel.from_xml_string(
+            cell_xml(scene, plan.pushes[0].fingers, physics, arm)
+        )
         self._data = self._mujoco.MjData(self._model)
-        self._data.qpos[OBJECT], self._data.qpos[TOOL] = scene.start_pose + start, self._pose
-        self._data.ctrl[:] = self._pose
+        if arm is not None and (why := arm.unreachable(self._pose)):
+            raise InputError(f"the arm cannot begin behind the plan's first pose: {why}")
+        self._data.qpos[OBJECT] = scene.start_pose + start
+        self._data.ctrl[:] = self._drives(self._pose)
+        self._data.qpos[-len(self._data.ctrl) :] = self._data.ctrl
         self._held = self._pose
         self._mujoco.mj_forward(self._model, self._data)
+        self._body, self._site = self._data.body("tool"), np.zeros(6)
 
     @property
     def object(self) -> Array:
@@ -86,7 +101,18 @@ class CellRobot(DryRun):
 
     def state(self) -> State:
         self._check()
-        return State(np.array(self._data.qpos[TOOL]), np.array(self._data.qvel[TOOL]), self.clock.now())
+        if self._arm is None:
+            return State(np.array(self._data.qpos[TOOL]), np.array(self._data.qvel[TOOL]), self.clock.now())
+        kind = self._mujoco.mjtObj.mjOBJ_XBODY
+        self._mujoco.mj_objectVelocity(self._model, self._data, kind, self._body.id, self._site, 0)
+        yaw = math.atan2(self._body.xmat[3], self._body.xmat[0])
+        yaw = self._held[3] + math.remainder(yaw - self._held[3], 2 * math.pi)
+        pose = np.array([*self._body.xpos, yaw])
+        return State(pose, np.array([*self._site[3:], self._site[2]]), self.clock.now())
+
+    def _drives(self, pose: Array) -> Array:
+        """Where the drives are for a pose of the tool."""
+        return pose if self._arm is None else self._arm.joints(pose)
 
     def stop(self) -> None:
         self._target = None
@@ -96,8 +122,8 @@ class CellRobot(DryRun):
         from PIL import Image
 
         camera = self._mujoco.MjvCamera()
-        camera.lookat[:2] = 0.5 * (self.object[:2] + self._data.qpos[TOOL][:2])
-        camera.distance, camera.azimuth, camera.elevation = 0.35, 60.0, -40.0
+        camera.lookat[:2] = 0.5 * (self.object[:2] + self._body.xpos[:2])
+        camera.distance, camera.azimuth, camera.elevation = (0.35 if self._arm is None else 1.1), 60.0, -30.0
         with self._mujoco.Renderer(self._model, *PICTURE) as renderer:
             renderer.update_scene(self._data, camera)
             Image.fromarray(renderer.render()).save(Path(path))
@@ -105,26 +131,36 @@ class CellRobot(DryRun):
     def _advance(self, until: float) -> None:
         steps = round((until - self.clock.now()) / STEP)
         begin, target, before = self.clock.now(), self._target, self._held
-        for k in range(1, steps + 1):
-            if target is not None and target.time > begin:
-                share = min(1.0, k * STEP / (target.time - begin))
-                self._held = before + share * (target.pose - before)
-                moving = begin + k * STEP < target.time + 0.5 * STEP
-                self._data.ctrl[:] = self._held + (LEAD * target.twist if moving else 0.0)
-            else:
-                self._data.ctrl[:] = self._held
-            self._mujoco.mj_step(self._model, self._data)
+        moving = 0
+        if target is not None and target.time > begin:
+            moving = min(steps, round((target.time - begin) / STEP))
+            share = min(1.0, (until - begin) / (target.time - begin))
+            end = target.pose if share == 1 else before + share * (target.pose - before)
+            here, there = self._drives(before), self._drives(end)
+            rate = (there - here) / max(moving, 1)
+            for k in range(1, moving + 1):
+                self._data.ctrl[:] = here + (k + LEAD / STEP) * rate
+                self._mujoco.mj_step(self._model, self._data)
+            self._held = end
+        if moving < steps:
+            self._data.ctrl[:] = self._drives(self._held)
+            self._mujoco.mj_step(self._model, self._data, steps - moving)
         if self._data.warning.number.any():
             raise RobotFault("the physics of the cell is unstable")
 
 
 def mujoco(address: Address, plan: Plan) -> CellRobot:
-    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`"""
-    if address.host not in ("", "tool"):
+    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`, or `mujoco://irb120`"""
+    if address.host not in ("", "tool", "irb120"):
         raise InputError(
-            "the physics cell has no such arm", value=address.text, hint="There is mujoco://tool."
+            "the physics cell has no such arm",
+            value=address.text,
+            hint="There are mujoco://tool and mujoco://irb120.",
         )
+    arm = None
+    if address.host == "irb120":
+        arm = Irb120(address.base) if any(address.base) else Irb120()
     limits, unknown = address.limits(LIMITS), Unknown.of(address)
     (table,) = address.numbers("table", 1, (np.nan,))
     address.check_used()
-    return CellRobot(plan, unknown, table=None if np.isnan(table) else table, limits=limits)
+    return CellRobot(plan, unknown, table=None if np.isnan(table) else table, arm=arm, limits=limits)

@@ -1,0 +1,103 @@
+"""The arm of the physics cell: its joint angles against MuJoCo's forward kinematics, its limits, and a plan on it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.execution import DONE, OutOfLimits, open_robot, run
+from flatpush.execution.cell.irb120 import LIMITS, Irb120
+from flatpush.execution.cell.model import FOOT, Physics, cell_xml, height_of
+from flatpush.execution.cell.robot import CellRobot, load
+
+
+@pytest.fixture(scope="module")
+def short_plan(triangle):
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
+    return fp.plan(fp.Scene(triangle, (-0.02, -0.05, 0.2), pusher=pusher, pushes=pushes))
+
+
+@pytest.mark.parametrize("base", [(0.36, 0.0, 0.2, 0.0), (0.2, -0.25, 0.1, 1.1)])
+def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, base):
+    mujoco, scene = load(), short_plan.scene
+    # In the model the middle of the object is at 0, in Irb120 the table.
+    arm = Irb120(base, height_of(scene) / 2 + FOOT)
+    model = mujoco.MjModel.from_xml_string(cell_xml(scene, short_plan.pushes[0].fingers, Physics(0.3), arm))
+    data = mujoco.MjData(model)
+    rng, tried = np.random.default_rng(4), 0
+    for pose in rng.uniform([-0.1, -0.1, 0.0, -6.0], [0.1, 0.1, 0.05, 6.0], (30, 4)):
+        if arm.unreachable(pose):
+            continue
+        tried += 1
+        data.qpos[-6:] = arm.joints(pose)
+        mujoco.mj_kinematics(model, data)
+        tool = data.body("tool")
+        assert np.allclose(tool.xpos, pose[:3], atol=1e-9)
+        turned = math.atan2(tool.xmat[3], tool.xmat[0])
+        assert math.remainder(turned - pose[3], 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+        assert tool.xmat[8] == pytest.approx(1.0)  # upright
+    assert tried > 10
+
+
+@pytest.mark.parametrize(
+    ("pose", "rule"),
+    [
+        ((0.25, 0.0, 0.0, 0.0), "it is too far away from the arm: 61. mm from its shoulder"),
+        ((-0.34, 0.01, 0.0, 0.0), "too near to the axis"),
+        ((-0.3, 0.0, 0.0, 0.0), r"third joint would be at \d+°, outside of -110° to 70°"),
+        ((0.0, 0.0, 0.0, 7.5), "sixth joint would be at -430°, outside of -400° to 400°"),
+        ((0.0, 0.0, 0.0, 6.5), "^$"),
+    ],
+)
+def test_what_the_arm_cannot_take_is_named(pose, rule):
+    import re
+
+    assert re.search(rule, Irb120().unreachable(np.array(pose)))
+
+
+def test_a_wrist_that_would_be_straight_is_named():
+    low = Irb120((0.36, 0.0, 0.0, 0.0))
+    found = {low.unreachable(np.array([x, 0.0, 0.0, 0.0])) for x in np.linspace(-0.2, 0.1, 31)}
+    assert "the arm's wrist is straight there" in found
+    assert "" in found
+    assert LIMITS.shape == (6, 2)
+
+
+def test_a_plan_out_of_reach_is_refused_before_the_first_command(short_plan):
+    far = Irb120((0.62, 0.0, 0.2, 0.0))
+    home = np.array([-0.15, -0.1, 0.03, 1.5])
+    with CellRobot(short_plan, arm=far, home=home) as robot:
+        with pytest.raises(OutOfLimits, match=r" s: it is too far away from the arm"):
+            run(short_plan, robot)
+        assert np.allclose(robot.state().pose, home, atol=1e-6)
+    with pytest.raises(fp.InputError, match="cannot begin behind the plan's first pose"):
+        CellRobot(short_plan, arm=Irb120((1.0, 0.0, 0.2, 0.0)))
+
+
+def test_the_arm_ends_where_the_tool_alone_does(short_plan):
+    with open_robot("mujoco://irb120?start=0.5,-0.5,1", short_plan) as robot:
+        ended = run(short_plan, robot)
+        there = robot.object
+    assert ended.outcome == DONE
+    off = [cycle.off for cycle in ended.cycles if "push" in cycle.leg]
+    assert np.mean(off) < 0.0001
+    assert np.max(off) < 0.0003
+    with open_robot("mujoco://tool?start=0.5,-0.5,1", short_plan) as robot:
+        run(short_plan, robot)
+        here = robot.object
+    assert np.hypot(*(there - here)[:2]) < 0.0005
+    assert abs(there[2] - here[2]) < math.radians(0.3)
+
+
+def test_the_base_of_the_arm_is_the_tables_pose_in_it(short_plan):
+    with pytest.raises(fp.InputError, match="cannot begin"):
+        open_robot("mujoco://irb120", short_plan, (2.0, 0.0, 0.2, 0.0))
+    turned = open_robot("mujoco://irb120", short_plan, (0.0, 0.36, 0.2, 0.0))
+    with turned:
+        assert turned._data.qpos[-6] == pytest.approx(math.atan2(0.36 + turned._pose[1], turned._pose[0]))
+    assert replace(Irb120(), height=0.01).joints(np.zeros(4)) == pytest.approx(
+        Irb120((0.36, 0.0, 0.21, 0.0)).joints(np.zeros(4))
+    )

@@ -1,0 +1,66 @@
+"""The robot experiment: its plans, its table, and a case of it in the cell."""
+
+import numpy as np
+import pytest
+
+from flatpush.experiments import experiment
+from flatpush.experiments.robot_runs import OFF, STARTS, Case, cases, draw, half_widths, plans, table
+from flatpush.geometry import pose_error
+
+
+def test_the_last_push_is_straight_and_across_the_one_before():
+    first, last = plans("fig7", STARTS["fig7"][0])
+    assert [arc.turn for push in last.pushes for arc in push.arcs] == ["straight"]
+    assert np.allclose(pose_error(first.scene.goal, last.scene.start), 0, atol=1e-12)
+    assert np.allclose(last.scene.goal, 0)
+    assert np.allclose(first.scene.start_pose, [0.02, -0.03, np.pi / 2])
+    one, other = (plan.pushes[-1].pusher[-1, 2] for plan in (first, last))
+    assert abs(np.cos(one - other)) < 0.6
+
+
+def test_intervals_and_table():
+    values = np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
+    assert half_widths(values) == pytest.approx(
+        [4.3027 / np.sqrt(3), 0.0], rel=1e-4
+    )  # t for two degrees of freedom
+    both = plans("fig7", STARTS["fig7"][0])
+    ends = np.array([[0.001, 0.0, 0.01], [0.003, 0.0, -0.01]])
+    case = Case(both, np.zeros((2, 3)), ends, ("done", "the tool is lost"), 20.0, 4.0)
+    text = table("fig7", [case])
+    assert "+2.00 ± 12.71" in text  # mm
+    assert "2.00 mm    0.57°  3.00 mm    0.57°" in text
+    assert "ended: the tool is lost" in text
+    assert "5.0 times real time" in text
+
+
+def test_starts_are_off_as_recorded(data_folder):
+    import csv
+
+    with (data_folder / "robot_exp_logs" / "summary_runs.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    off = np.array(
+        [
+            [float(r[f"init_d{a}_mm"]) - float(r[f"nominal_d{a}_mm"]) for a in "xy"]
+            + [(float(r["init_theta_deg"]) - float(r["nominal_dtheta_deg"]) + 180) % 360 - 180]
+            for r in rows
+        ]
+    )
+    spread = off.std(axis=0, ddof=1)
+    assert np.sqrt(np.mean(spread[:2] ** 2)) / 1000 == pytest.approx(OFF[0], abs=2e-5)
+    assert np.radians(spread[2]) == pytest.approx(OFF[1], abs=np.radians(0.05))
+
+
+@pytest.mark.slow
+def test_a_case_ends_at_the_goal_and_is_drawn(tmp_path):
+    case = next(iter(cases("fig7", runs=2)))
+    assert case.outcomes == ("done", "done")
+    assert np.all(np.hypot(*case.errors[:, :2].T) < 0.0005)
+    assert np.all(np.abs(case.errors[:, 2]) < np.radians(0.3))
+    assert not np.allclose(case.starts[0], case.starts[1])
+    draw("fig7", [case], tmp_path / "fig7.svg")
+    assert "start 20, -30, 90" in (tmp_path / "fig7.svg").read_text()
+
+
+def test_the_figures_are_experiments():
+    for name in STARTS:
+        assert callable(experiment(name, runs=1))
