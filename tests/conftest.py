@@ -5,10 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import flatpush as fp
 
 ROOT = Path(__file__).parents[1]
+
+# The same draws in every run.
+settings.register_profile("same draws", derandomize=True)
+settings.load_profile("same draws")
 
 
 @pytest.fixture(scope="session")
