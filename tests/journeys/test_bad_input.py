@@ -475,6 +475,19 @@ def test_a_list_that_no_scene_has_is_refused_before_each_of_its_entries():
     assert failure.value.key == "object.outline"
 
 
+@pytest.mark.parametrize("kind", ["json", "yaml"])
+def test_the_first_entry_too_many_of_a_file_ends_its_reading(tmp_path, kind):
+    """10 MB of numbers took three seconds as JSON and fifteen as YAML: all of them were read first."""
+    file = tmp_path / f"scene.{kind}"
+    text = '{"flatpush": "scene/1", "object": {"outline": [' + "1.5," * 200_000 + "1.5]}}"
+    file.write_text(text)
+    error = refusal(file)
+    assert "a list has at most 100000 entries" in str(error)
+    assert error.key == "object.outline"
+    file.write_text("[" + "1.5," * 200_000 + "1.5]")
+    assert len(str(refusal(file))) < 400
+
+
 def test_measured_numbers_beyond_all_measure_are_bad_rows(tmp_path):
     """1e308 ended in a singular value decomposition that did not converge."""
     rows = ["fx,fy,tau,vx,vy,omega", *["1,0.2,0.01,0.02,0.003,0.1"] * 3, ",".join(["1e308"] * 6)]

@@ -1,5 +1,7 @@
 """The numbers of the certificate, each computed another way: closed forms, or brute force over forces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,10 @@ import flatpush as fp
 from flatpush.contact import PointContact, composite_margin, spacing_margin, two_point_sticks
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import exp, shift_twist, velocity_at
+from flatpush.problem import TransitSegment
 from flatpush.simulation import certify
 from flatpush.simulation.claims import TRUSTED_GROWTH
+from flatpush.simulation.clearance import clearance_of
 from flatpush.simulation.cone_margins import cone_margins
 from flatpush.simulation.margins import Margins, worse_of
 
@@ -35,6 +39,42 @@ def test_the_friction_margin_is_one_less_tangent_over_mu(margin):
     assert plan.certificate.friction_margin == pytest.approx(margin, abs=1e-12)
     degrees = np.degrees(np.arctan(MU) - np.arctan(max(tangents)))
     assert plan.certificate.friction_margin_degrees == pytest.approx(degrees, abs=1e-9)
+
+
+def test_the_model_offset_is_how_far_the_line_of_force_passes_from_the_contact():
+    """The table's force summed over feet: each resists against its own velocity. Planned with the fitted ellipsoid."""
+    feet = np.array([(-0.018, -0.012), (0.02, -0.01), (0.0, 0.014)])
+    thing = fp.Object(BLOCK, fp.Support.points(feet), friction=MU)
+    pushes = (fp.Push("below", thing.outline.at(0, 0.5)),)
+    plan = fp.plan(
+        fp.Scene(
+            thing,
+            (0.01, -0.12, 0.3),
+            pushes=pushes,
+            planning=fp.Planning(model="ellipsoid", iterations=1),
+        )
+    )
+    offsets = []
+    for arc in plan.pushes[0].arcs:
+        vx, vy, w = arc.twist
+        v = np.stack([vx - w * feet[:, 1], vy + w * feet[:, 0]], axis=1)
+        forces = v / np.linalg.norm(v, axis=1)[:, None] / 3
+        arms = feet - np.array([0.0, -R])
+        torque = np.sum(arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0])
+        offsets.append(abs(torque) / np.linalg.norm(forces.sum(axis=0)))
+    assert max(offsets) > 1e-5
+    assert plan.certificate.model_offset == pytest.approx(max(offsets), rel=1e-9)
+    assert any("passes the contact at" in text for text in plan.certificate.warnings)
+
+
+def test_the_clearance_is_kept_between_two_samples_far_apart():
+    """A spike that a fingertip passes at 10 mm, half way between samples that are 10 cm from it."""
+    plan = one_finger(0.2)
+    spike = [(0.3, 0.06), (0.301, 0.1), (0.299, 0.1)]
+    scene = replace(plan.scene, workspace=fp.Workspace(None, [spike]))
+    past = TransitSegment(np.array([0.0, 9.0]), np.array([[0.2, 0.05, 0.0], [0.4, 0.05, 0.0]]), np.zeros(2))
+    found = clearance_of(scene, (*plan.segments, past))
+    assert found == pytest.approx(0.01 - scene.pusher.tip_radius, abs=1.1e-5)
 
 
 def test_the_growth_is_e_to_the_way_over_the_length_of_divergence():

@@ -74,6 +74,16 @@ def test_an_object_too_near_to_a_wall_and_beside_its_goal_is_seen(honest):
     assert any("from the goal" in fault for fault in check(plan | {"scene": far}, rows))
 
 
+def test_the_certificate_knows_the_clearance_that_dense_samples_have(honest):
+    """Within 0.15 mm: a clearance as certified is kept at every 0.1 mm, and one that is a little more is not."""
+    plan, rows = honest
+    known = plan["certificate"]["clearance"]
+    for more, kept in ((0.0, True), (1.5e-4, False)):
+        margin = {**plan["scene"]["planning"]["margin"], "clearance": known + more}
+        scene = plan["scene"] | {"planning": {**plan["scene"]["planning"], "margin": margin}}
+        assert (list(check(plan | {"scene": scene}, rows)) == []) == kept
+
+
 @pytest.mark.slow
 def test_random_scenes_have_no_fault(capsys):
     assert main(20, 5000) == 0, capsys.readouterr().out

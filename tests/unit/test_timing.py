@@ -54,3 +54,10 @@ def test_samples_are_dense_enough_for_straight_interpolation(one_finger_plan, tw
                 moved = [transform(poses[::40], corner) for poses in (straight, true)]
                 assert np.max(np.linalg.norm(moved[0] - moved[1], axis=1)) < 5e-5
             X, clock = compose(X, exp(arc.twist * arc.duration)), clock + arc.duration
+
+
+def test_a_hand_that_turns_with_the_object_turns_no_faster_than_it_may():
+    """On a circle of 5 mm a tip at 20 mm/s would turn by 4 rad/s; the hand may turn by 1."""
+    law = Trapezoid.along(0.1, 0.005, 0.02, 1.0, turn_rate=1.0)
+    t = np.linspace(0, law.duration, 20001)
+    assert np.max(np.gradient(law.travelled(t), t)) / 0.005 == pytest.approx(1.0)

@@ -59,7 +59,7 @@ def load_plan(path: str | os.PathLike[str]) -> Plan:
         InputError: for anything wrong with the file; it names the file, the key, the value, the rule and a
             hint.
     """
-    return parse_plan(read_mapping(path, MOST_BYTES), os.fspath(path))
+    return parse_plan(read_mapping(path, MOST_BYTES, MOST_BYTES), os.fspath(path))
 
 
 def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:

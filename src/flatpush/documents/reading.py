@@ -13,6 +13,7 @@ from ..errors import InputError
 
 MOST_BYTES = 10_000_000
 MOST_LEVELS = 60
+MOST_ENTRIES = 100_000  # of one list; samples of a plan may be more
 
 # The plain scalars of YAML 1.2: unlike in YAML 1.1, 1e-3 is a number, on and off are words and 010 is ten.
 _INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -30,15 +31,17 @@ _WORDS |= dict.fromkeys(("", "~", "null", "Null", "NULL"))
 _WORDS |= dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan"))
 
 
-def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[str, object]:
+def read_mapping(
+    path: str | os.PathLike[str], most: int = MOST_BYTES, longest: int = MOST_ENTRIES
+) -> dict[str, object]:
     """The document in a YAML or JSON file, as plain values in the file's own units, not checked further.
 
     A file named .json is read as JSON, one named .yaml or .yml as YAML; of others, one that begins with a
     brace is JSON. Numbers and words are those of YAML 1.2. A file has at most `most` bytes.
 
     Raises:
-        InputError: if the file cannot be read, is empty, binary, cut off or too large, holds a key twice, or
-            uses YAML's aliases or tags.
+        InputError: if the file cannot be read, is empty, binary, cut off or of more than so many bytes, holds a list
+            of more than so many entries or a key twice, or uses YAML's aliases or tags.
     """
     source = os.fspath(path)
     text = read_text(path, most)
@@ -46,7 +49,7 @@ def read_mapping(path: str | os.PathLike[str], most: int = MOST_BYTES) -> dict[s
     is_json = kind == ".json" or (kind not in (".yaml", ".yml") and text.lstrip().startswith("{"))
     value = None
     if text.strip():
-        value = _read_json(text, source) if is_json else _read_yaml(text, source)
+        value = _read_json(text, source, longest) if is_json else _read_yaml(text, source, longest)
     if value is None:
         hint = '"flatpush init" writes a scene to start from.'
         raise InputError("the file is empty", source=source, hint=hint)
@@ -124,7 +127,7 @@ class _Pairs(list[tuple[str, Any]]):
     """The pairs of a JSON object, before keys that stand twice are looked for."""
 
 
-def _read_json(text: str, source: str) -> Any:
+def _read_json(text: str, source: str, longest: int) -> Any:
     try:
         value = json.loads(text, object_pairs_hook=_Pairs, parse_int=_whole)
     except json.JSONDecodeError as error:
@@ -135,24 +138,25 @@ def _read_json(text: str, source: str) -> Any:
         ) from None
     except RecursionError:
         raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source) from None
-    return _unpaired(value, source, "", 0)
+    return _unpaired(value, source, "", 0, longest)
 
 
-def _unpaired(value: Any, source: str, path: str, level: int) -> Any:
+def _unpaired(value: Any, source: str, path: str, level: int, longest: int) -> Any:
     if level > MOST_LEVELS:
         raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=path)
     if isinstance(value, _Pairs):
         result: dict[str, Any] = {}
         for key, item in value:
             _refuse_twice(key, result, source, path)
-            result[key] = _unpaired(item, source, join(path, key), level + 1)
+            result[key] = _unpaired(item, source, join(path, key), level + 1, longest)
         return result
     if isinstance(value, list):
-        return [_unpaired(item, source, join(path, i), level + 1) for i, item in enumerate(value)]
+        _refuse_long(len(value), longest, source, path)
+        return [_unpaired(item, source, join(path, i), level + 1, longest) for i, item in enumerate(value)]
     return value
 
 
-def _read_yaml(text: str, source: str) -> Any:
+def _read_yaml(text: str, source: str, longest: int) -> Any:
     """Builds the values from the parser's events, so that nothing in the file can construct anything else."""
     import yaml
 
@@ -192,6 +196,7 @@ def _read_yaml(text: str, source: str) -> Any:
                     steps[-1] = None
                 else:
                     holder.append(value)
+                    _refuse_long(len(holder), longest, source, path)
                 if not isinstance(event, yaml.ScalarEvent):
                     holders.append(value)
                     steps.append(None)
@@ -238,6 +243,12 @@ def _refuse_tricks(event: Any, source: str, path: str, level: int) -> None:
         )
     if level > MOST_LEVELS:
         raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=path[:80])
+
+
+def _refuse_long(count: int, longest: int, source: str, path: str) -> None:
+    if count > longest:
+        place = re.sub(r"\[\d+\]$", "", path) if path.endswith(f"[{count - 1}]") else path
+        raise InputError(f"a list has at most {longest} entries", source=source, key=place)
 
 
 def _refuse_twice(key: str, mapping: Mapping[str, Any], source: str, path: str) -> None:

@@ -16,16 +16,15 @@ from . import scene_model as m
 from .context import PER_METRE, Context
 from .outline_reader import pixels, read_drawing
 from .push_reader import open_polygon, read_pushes
-from .reading import join, plain, read_mapping
+from .reading import MOST_ENTRIES, join, plain, read_mapping
 from .refusals import checked, nearest
 
-# A pose whose angle is more than two turns was written in degrees.
-LONGEST = 100_000
 # Keys of the pusher that are lengths, or lengths over time.
 LENGTHS = (
     *("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"),
     *("travel_speed", "travel_acceleration"),
 )
+# A pose whose angle is more than two turns was written in degrees.
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
 
 
@@ -80,8 +79,8 @@ def _merged(document: Any, changes: Mapping[str, Any]) -> Any:
 
 def _check_lengths(value: object, source: str, key: str) -> None:
     """Refuses lists that no scene has, before each of their entries is looked at."""
-    if isinstance(value, list | tuple) and len(value) > LONGEST:
-        rule = f"a list of a scene has at most {LONGEST} entries, not {len(value)}"
+    if isinstance(value, list | tuple) and len(value) > MOST_ENTRIES:
+        rule = f"a list of a scene has at most {MOST_ENTRIES} entries, not {len(value)}"
         raise InputError(rule, source=source, key=key)
     if isinstance(value, Mapping):
         for name, item in value.items():
