@@ -16,7 +16,12 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Pose = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Goal = Annotated[list[Number | Literal["free"]], Field(min_length=3, max_length=3)]
+# What is not the word is a number, or refused as one.
+NumberOrFree = Annotated[
+    Annotated[Literal["free"], Tag("<word>")] | Annotated[Number, Tag("<number>")],
+    Discriminator(lambda value: "<word>" if value == "free" else "<number>"),
+]
+Goal = Annotated[list[NumberOrFree], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Row], Field(min_length=3, max_length=3)]
 Coefficients = Annotated[list[Finite], Field(min_length=15, max_length=15)]
