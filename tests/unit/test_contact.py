@@ -14,10 +14,30 @@ from flatpush.contact import (
 from flatpush.contact.placement import travels
 from flatpush.errors import InputError, NoDubinsReduction
 from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Support, local_ellipsoid
+from flatpush.friction.surface import WrenchSet
 from flatpush.geometry import Outline, perpendicular, rotate, velocity_at
+from flatpush.geometry.pose import cross
 
 ISOTROPIC = Ellipsoid(np.diag([1.0, 1.0, 4.0]))
 TRIANGLE = Outline.polygon([(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)])
+
+
+def test_forces_of_a_facet_pass_through_the_contact():
+    """Each end of the chord is a wrench of the set, with the greatest free force and no torque about the contact."""
+    rng, chords = np.random.default_rng(3), 0
+    for _ in range(200):
+        contact = PointContact([rng.normal(), -rng.uniform(0.1, 2.0)], [0.0, 1.0], 0.5)
+        free, radius = rng.normal(size=2), 1.0
+        force = rng.normal(size=2)
+        # A wrench of the set passes through the contact: the middle one plus some free force.
+        inside = rotate(rng.uniform(-np.pi, np.pi), np.array([rng.uniform(0, 0.9), 0.0]))
+        torque = cross(contact.point, force + inside) - cross(free, inside)
+        for end in contact.forces(WrenchSet(np.array([*force, torque]), free, radius)):
+            own = end - force
+            assert np.hypot(*own) == pytest.approx(radius)
+            assert torque + cross(free, own) == pytest.approx(cross(contact.point, end), abs=1e-12)
+            chords += 1
+    assert chords == 400
 
 
 def test_left_is_left_as_seen_along_the_inward_normal():

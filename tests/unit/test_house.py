@@ -18,7 +18,7 @@ CIRCLES = {
     frozenset({"flatpush.view.drawing", "flatpush.view.raster", "flatpush.view.svg"}),
     frozenset({"flatpush.documents.mechanics", "flatpush.documents.surface_file"}),
 }
-MOST_ANY = 115
+MOST_ANY = 80
 
 
 @pytest.mark.parametrize(

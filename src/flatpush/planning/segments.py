@@ -62,11 +62,6 @@ def tip_radii(car: Car, fingers: Array) -> Array:
     return np.array([left, np.inf, right])
 
 
-def arc_duration(arc: ArcGeometry, pusher: Pusher) -> float:
-    """Time of an arc from rest to rest [s]."""
-    return arc_law(arc, pusher).duration
-
-
 def arc_law(arc: ArcGeometry, pusher: Pusher) -> Trapezoid:
     """The time law of an arc, whose hand turns with the object."""
     return Trapezoid.along(
