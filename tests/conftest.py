@@ -11,6 +11,9 @@ import flatpush as fp
 
 ROOT = Path(__file__).parents[1]
 
+# MuJoCo asks for it when it is first imported, by whichever test; pictures of the cell need no display then.
+os.environ.setdefault("MUJOCO_GL", "egl")
+
 # The same draws in every run.
 settings.register_profile("same draws", derandomize=True)
 settings.load_profile("same draws")

@@ -352,7 +352,7 @@ def test_robots_of_others_come_by_entry_points(short_plan, monkeypatch):
     )
     with open_robot("mine://?z=0.1", short_plan) as robot:
         assert robot.state().pose[2] == 0.1
-    with pytest.raises(fp.InputError, match=r"There are: dry-run, mine, .*sim"):
+    with pytest.raises(fp.InputError, match=r"There are: dry-run, egm, mine, mujoco, sim"):
         open_robot("yours", short_plan)
 
 

@@ -251,7 +251,9 @@ def replanned_plainly(query, path):
             for turn in np.deg2rad([0.2, -0.2]):
                 off = path.poses[i] + [2e-4 * np.cos(at), 2e-4 * np.sin(at), turn]
                 again = [path.cost]
-                for word in direct_paths(path.fleet, off, path.poses[i + len(leg)]):
+                for word in direct_paths(
+                    path.fleet, off, np.tile(path.poses[i + len(leg)], (path.fleet.size, 1))
+                ):
                     steps = [word.step(*piece) for piece in word.pieces]
                     gap = path_clearance(query.world, query.bodies[push], off, steps).distance
                     if word.pushes == (push,) and gap >= query.clearance:

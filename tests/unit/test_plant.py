@@ -158,7 +158,7 @@ def test_what_overlaps_a_little_more_than_it_may_is_pushed_out(square):
 
 def test_a_finger_on_its_way_neither_creeps_nor_leaps(monkeypatch):
     """Before it touches it goes most of the gap at once, and yet it meets a needle that it would pass in a leap."""
-    monkeypatch.setattr(module, "_patience", [1e9])
+    monkeypatch.setattr(module, "PATIENCE", 1e9)
     monkeypatch.setattr(module, "_ready", set())
     looked = []
     real = steps._first_touch

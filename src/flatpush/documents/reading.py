@@ -37,7 +37,8 @@ def read_mapping(
     """The document in a YAML or JSON file, as plain values in the file's own units, not checked further.
 
     A file named .json is read as JSON, one named .yaml or .yml as YAML; of others, one that begins with a
-    brace is JSON. Numbers and words are those of YAML 1.2. A file has at most `most` bytes.
+    brace is JSON. Numbers and words are those of YAML 1.2. A file has at most `most` bytes,
+    and a list in it at most `longest` entries (a number).
 
     Raises:
         InputError: if the file cannot be read, is empty, binary, cut off or of more than so many bytes, holds a list

@@ -63,7 +63,7 @@ def prove(plan: Plan, loads: float = 0.2, *, friction: float | None = None, offs
     >>> scene = fp.Scene(thing, (0.0, -0.1, 0.0), pusher=fp.Pusher(fingers=2, spacing=0.018), pushes=(push,))
     >>> proof = prove(fp.plan(scene), 0.05)
     >>> proof.proved, round(proof.loads, 2)
-    (True, 0.64)
+    (True, 0.72)
     """
     scene = plan.scene
     if not plan.pushes:
