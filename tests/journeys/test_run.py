@@ -132,7 +132,7 @@ def test_nothing_real_moves_unless_somebody_says_so(files):
 
 def test_an_interrupt_stops_the_robot_and_leaves_a_log(files, tmp_path):
     log = tmp_path / "log.csv"
-    asked = start(files, "--yes", "--log", str(log), stdin=subprocess.DEVNULL)
+    asked = start(files, "--yes", "--speed", "0.1", "--log", str(log), stdin=subprocess.DEVNULL)
     patience = time.monotonic() + 120
     while not (log.exists() and "segment 1" in log.read_text()):
         assert time.monotonic() < patience
