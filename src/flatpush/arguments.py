@@ -3,6 +3,8 @@
 NumPy reads "0" and True as numbers; a caller who passes them means something else.
 """
 
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -51,18 +53,14 @@ def vector(values: ArrayLike, size: int, rule: str, key: str = "") -> Array:
     return found
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is one real number; True, "1" and [1] are none."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
-def is_finite(value: object) -> bool:
+def is_finite(value: object) -> TypeGuard[float]:
     """Whether a value is one finite real number."""
-    return (
-        isinstance(value, int | float | np.integer | np.floating)
-        and is_number(value)
-        and bool(np.isfinite(value))
-    )
+    return is_number(value) and bool(np.isfinite(value))
 
 
 def _has_truth(values: object) -> bool:

@@ -32,6 +32,8 @@ ROOM = 0.512
 WALLS = (0.0075, 0.5035)  # the T stays between: walls at 7 and 504 px, half a pixel off
 GOAL = np.array([0.256, 0.256, np.pi / 4])
 SOLVED = 0.95  # of the goal's area covered
+# How the disc follows commands, by the environment's names: see Agent; control_hz: of the control steps [Hz].
+LAW = {"k_p": 100.0, "k_v": 20.0, "dt": 0.01, "control_hz": 10.0}
 
 WITHIN = 0.0022  # sequences whose farthest point misses the goal by less are tried [m]
 ENOUGH = 0.955  # coverage that a sequence must promise
@@ -85,7 +87,8 @@ class PushTPolicy:
     def __init__(self, env: Environment | None = None) -> None:
         if env is not None:
             check_environment(env)
-        self.agent = Agent(100.0, 20.0, 0.01, 10, ROOM)
+        stiffness, damping, dt, rate = LAW.values()
+        self.agent = Agent(stiffness, damping, dt, round(1 / (dt * rate)), ROOM)
         thing = tee()
         plant = Plant(thing, [[0.0, 0.0]], TIP, surface=thing.surface, cof=CENTRE_OF_GRAVITY)
         self.slides: SlideLibrary = slide_library(
@@ -153,22 +156,27 @@ class PushTPolicy:
                 poses.append(compose(poses[-1], self.slides.displacement[k]))
             if not all(map(_between_walls, poses[1:])) or (coverage and _coverage(poses[-1]) < coverage):
                 continue
-            made = self._made(agent, pose, sequence, best)
+            made = self._made(agent, poses, sequence, best)
             if made is not None:
                 best, commands = made
                 if not coverage:
                     break
         return commands
 
-    def _made(self, agent: Array, pose: Array, sequence: Sequence, below: float) -> tuple[int, Array] | None:
-        """Control steps of a sequence and the commands of its first push, if it can be made in fewer than so many."""
+    def _made(
+        self, agent: Array, poses: list[Array], sequence: Sequence, below: float
+    ) -> tuple[int, Array] | None:
+        """Control steps of a sequence and the commands of its first push, if it can be made in fewer than so many.
+
+        The poses are the T's before each push.
+        """
         library, steps, first = self.slides, 0, None
-        for done, k in enumerate(sequence.pushes):
+        for done, (k, pose) in enumerate(zip(sequence.pushes, poses, strict=False), start=1):
             begin, end = transform(pose, library.begin[k]), transform(pose, library.end[k])
             if not self.agent.allowed(np.stack([begin, end])):
                 return None
             push = self.agent.straight(begin, end)
-            rest = LEAST_STEPS * (len(sequence.pushes) - done - 1)
+            rest = LEAST_STEPS * (len(sequence.pushes) - done)
             if push is None or steps + LEAST_STEPS + len(push) - 2 + rest >= below:
                 return None
             there = self._around(agent, pose, begin)
@@ -177,7 +185,7 @@ class PushTPolicy:
             steps += len(there) + len(push)
             if steps + rest >= below:
                 return None
-            agent, pose = end, compose(pose, library.displacement[k])
+            agent = end
             if first is None:
                 first = np.concatenate([there, push])
         assert first is not None
@@ -202,9 +210,7 @@ def check_environment(env: Environment) -> None:
         InputError: naming what differs.
     """
     inner = env.unwrapped
-    wanted = {
-        "obs_type": "state", "k_p": 100, "k_v": 20, "dt": 0.01, "control_hz": 10, "success_threshold": SOLVED,
-    }  # fmt: skip
+    wanted = {"obs_type": "state", **LAW, "success_threshold": SOLVED}
     for name, value in wanted.items():
         found = getattr(inner, name, None)
         if found != value:

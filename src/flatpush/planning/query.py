@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..arguments import vector
 from ..errors import InputError
 from ..geometry.collision import Body, World
 from ..geometry.collision.world import Box
@@ -63,11 +64,8 @@ class Query:
 
     def __post_init__(self) -> None:
         for name in ("start", "goal"):
-            given = getattr(self, name)
-            pose = np.array(given, dtype=float)
-            if pose.shape != (3,) or not np.isfinite(pose).all():
-                raise InputError(f"the {name} is one finite pose (x, y, θ)", value=given)
-            object.__setattr__(self, name, pose)
+            rule = f"the {name} is one finite pose (x, y, θ)"
+            object.__setattr__(self, name, vector(getattr(self, name), 3, rule))
         if self.fleet.size == 0:
             raise InputError("there is at least one push", value=0)
 

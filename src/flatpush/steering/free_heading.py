@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..geometry.pose import Array
+from ..geometry.pose import Array, wrap_angle
 from .fleet import Fleet
 
 Complex = NDArray[np.complexfloating]
@@ -77,7 +77,7 @@ def cheapest_headings(
     within = min(within, np.pi)
     grid = about + within * np.linspace(-1.0, 1.0, HEADINGS + 1)
     special = np.concatenate([h for car in range(fleet.size) for h in _special(fleet, car, X, Y)], axis=0).T
-    special = about + np.clip(np.remainder(special - about + np.pi, 2 * np.pi) - np.pi, -within, within)
+    special = about + np.clip(wrap_angle(special - about), -within, within)
     tried = np.concatenate([special, np.broadcast_to(grid, (len(Y), len(grid)))], axis=1)
     found = costs(tried)
     at = np.argmin(found, axis=2)

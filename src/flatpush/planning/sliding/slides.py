@@ -11,7 +11,7 @@ from ...geometry.pose import Array, rotate
 from ...problem import Object
 from ...simulation.plant import Plant
 
-# By default: contacts a twentieth of the object's size apart, directions 15° apart, lengths that grow by half.
+# By default: contacts a twenty-fifth of the object's size apart, directions 15° apart, lengths that grow by half.
 CONTACTS = 0.04  # distance of neighbouring contacts, by the outline's size
 STEEPEST = np.deg2rad(60.0)  # angle between push and inward normal
 DIRECTIONS = 9
