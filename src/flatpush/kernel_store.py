@@ -72,7 +72,7 @@ def save(name: str, data: bytes) -> None:
         except BaseException:
             os.unlink(temporary)
             raise
-        _tidy(place)
+        _prune(place)
     except OSError as error:
         _tell_once(place, error)
 
@@ -132,7 +132,7 @@ def _digest(data: bytes) -> bytes:
     return hashlib.blake2b(data, digest_size=DIGEST_BYTES).digest()
 
 
-def _tidy(place: Path) -> None:
+def _prune(place: Path) -> None:
     """Removes what no run has used for a long time, such as kernels of former versions."""
     for path in place.iterdir():
         with suppress(OSError):

@@ -13,7 +13,7 @@ from flatpush.steering import dubins
 from flatpush.steering.fleet import Fleet
 
 
-class Way(NamedTuple):
+class PoseSequence(NamedTuple):
     """A way to the goal: poses (m + 1, 3), pushes and costs of the m legs, and the cost with the changes of push."""
 
     poses: np.ndarray
@@ -47,7 +47,7 @@ class PlanGraph:
             self.costs[a, better], self.follow[a, better] = cost[better], i
             self.arrived = np.minimum(self.arrived, self.costs[a] + fleet.switching[:, a][:, None])
 
-    def query(self, start: np.ndarray) -> tuple[Way, float]:
+    def query(self, start: np.ndarray) -> tuple[PoseSequence, float]:
         """The cheapest way from a start, and the cost of the best single push."""
         reached = self._lengths(np.asarray(start, float)[None], np.vstack([self.poses, self.goal]))
         onward = np.hstack([self.arrived, np.zeros((self.fleet.size, 1))])
@@ -61,7 +61,7 @@ class PlanGraph:
             pushes.append(int(push))
             legs.append(float(self.costs[push, at] - (self.arrived[push, then] if then >= 0 else 0.0)))
             at = then if then >= 0 else n
-        return Way(np.array([*poses, self.goal]), pushes, legs, cost), float(reached[:, n].min())
+        return PoseSequence(np.array([*poses, self.goal]), pushes, legs, cost), float(reached[:, n].min())
 
     def _lengths(self, starts: np.ndarray, goals: np.ndarray) -> np.ndarray:
         cars = np.column_stack([self.fleet.flat_point, self.fleet.heading])

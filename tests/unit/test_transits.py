@@ -9,7 +9,7 @@ import pytest
 import flatpush as fp
 from flatpush.errors import FlatpushError
 from flatpush.geometry import transform
-from flatpush.planning.transits import Transits, Way
+from flatpush.planning.transits import PusherPath, Transits
 from flatpush.problem.mechanics import placement_of
 
 L_SHAPE = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.02), (0.02, 0.02), (0.02, 0.06), (0.0, 0.06)]
@@ -121,8 +121,8 @@ def test_a_transit_keeps_the_limits():
 def test_a_long_way_on_the_table_is_driven_at_the_speed_of_the_table():
     pusher = fp.Pusher(speed=0.05, acceleration=0.2, travel_speed=0.08, travel_acceleration=0.4)
     poses = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
-    assert Way(poses, np.zeros(2), 0.0).duration(pusher) == pytest.approx(0.3 / 0.05 + 0.05 / 0.2)
-    assert Way(poses, np.full(2, 0.03), 0.0).duration(pusher) == pytest.approx(0.3 / 0.08 + 0.08 / 0.4)
+    assert PusherPath(poses, np.zeros(2), 0.0).duration(pusher) == pytest.approx(0.3 / 0.05 + 0.05 / 0.2)
+    assert PusherPath(poses, np.full(2, 0.03), 0.0).duration(pusher) == pytest.approx(0.3 / 0.08 + 0.08 / 0.4)
 
 
 def test_a_finger_in_a_slot_backs_straight_out_or_not_at_all():

@@ -21,26 +21,26 @@ def command(
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
     from ..documents import check_outputs, load_scene, outline_note, scene_files
-    from ..planning import describe, freedom
+    from ..planning import controllability, describe
     from ..planning.description import turning_radii
 
-    asked, note = load_scene(scene), outline_note(scene)
+    loaded, note = load_scene(scene), outline_note(scene)
     if figure is not None:
         check_outputs(scene_files(scene), [figure])
     with telling("describing"):
-        pushes = describe(asked)
+        pushes = describe(loaded)
     if figure is not None:
         from ..view import describe_figure
         from ..view.sketches import sketches
 
-        describe_figure(asked, sketches(asked, pushes), figure, note)
+        describe_figure(loaded, sketches(loaded, pushes), figure, note)
     data = {
-        "object": asked.object.name,
+        "object": loaded.object.name,
         "outline": None if note is None else note.data(),
-        "friction": asked.object.friction,
-        "centre_of_friction": [float(x) for x in asked.object.cof],
-        "second_moments": [[float(x) for x in row] for row in asked.object.support.covariance],
-        "freedom": freedom([p.option.car for p in pushes if p.option.car is not None]),
+        "friction": loaded.object.friction,
+        "centre_of_friction": [float(x) for x in loaded.object.cof],
+        "second_moments": [[float(x) for x in row] for row in loaded.object.support.covariance],
+        "controllability": controllability([p.option.car for p in pushes if p.option.car is not None]),
         "pushes": [_push(p, turning_radii(p)) for p in pushes],
     }
     if as_json:
@@ -80,8 +80,8 @@ def _push(described: "PushDescription", radii: dict[str, float]) -> dict[str, An
 
 
 def _tell(data: dict[str, Any]) -> None:
+    from ..planning.controllability import WORDS
     from ..planning.description import MIDDLE
-    from ..planning.freedom import WORDS
 
     mm = 1000.0
     cof, moments = data["centre_of_friction"], data["second_moments"]
@@ -93,7 +93,7 @@ def _tell(data: dict[str, Any]) -> None:
         f"second moments of the pressure xx {mm * mm * moments[0][0]:.1f}, yy {mm * mm * moments[1][1]:.1f},"
         f" xy {mm * mm * moments[0][1]:.1f} mm²"
     )
-    typer.echo(WORDS[data["freedom"]])
+    typer.echo(WORDS[data["controllability"]])
     for push in data["pushes"]:
         at = push["at"]
         typer.echo(f"\npush {push['name']} at ({mm * at[0]:.2f}, {mm * at[1]:.2f}) mm")

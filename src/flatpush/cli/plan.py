@@ -71,7 +71,7 @@ def command(
             if value is not None
         },
     }
-    asked = load_scene(scene, {key: value for key, value in overrides.items() if value})
+    loaded = load_scene(scene, {key: value for key, value in overrides.items() if value})
     check_outputs(scene_files(scene), [output, figure, snapshots])
     if figure is not None:
         from ..view import check_figure
@@ -81,7 +81,7 @@ def command(
         from ..view import check_snapshots
 
         check_snapshots(snapshots)
-    found, explored = _planned(asked)
+    found, explored = _planned(loaded)
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))

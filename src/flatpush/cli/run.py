@@ -123,8 +123,10 @@ def _closed(
         )
     ticks = max(1, round(1 / (RATE * robot.limits.period)))
     camera = Camera()
-    asked = TrackedRun(law, 1 / (ticks * robot.limits.period), camera=camera)
-    return asked.law(slowed(plan, robot.limits, speed)), SimulatedSensor(camera, np.random.default_rng(seed))
+    tracked = TrackedRun(law, 1 / (ticks * robot.limits.period), camera=camera)
+    return tracked.law(slowed(plan, robot.limits, speed)), SimulatedSensor(
+        camera, np.random.default_rng(seed)
+    )
 
 
 def _show(limits: Limits, course: Course, plan: Plan, speed: float) -> None:

@@ -68,7 +68,7 @@ def command(
         numbers(centre, 2, "--centre") or [],
         numbers(start, 3, "--start") or [],
     )
-    asked = TrackedRun(
+    tracked = TrackedRun(
         cast("Law", controller),
         rate,
         cast("Timing", timing),
@@ -89,7 +89,7 @@ def command(
 
         check_outputs([plan], [figure])
         check_ending(figure, (".svg", ".png"))
-    run = asked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
+    run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     distance, turn = goal_error(loaded, run.object[-1])

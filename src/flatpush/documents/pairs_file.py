@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..friction.pairs import Pairs
 from .context import PER_METRE
 from .reading import read_text
-from .scene_model import FAR
+from .scene_model import LARGEST
 
 # Two ways to name the six numbers: our plain one, and that of the recorded force pushes.
 PLAIN = ("fx", "fy", "tau", "vx", "vy", "omega")
@@ -214,8 +214,8 @@ def _number(cell: str, name: str) -> float:
         raise _Unusable(f"{name} is not a number ({cell.strip()[:20]!r})") from None
     if not math.isfinite(value):
         raise _Unusable(f"{name} is not finite ({cell.strip()})")
-    if abs(value) > FAR:
-        raise _Unusable(f"{name} is beyond {FAR:g} ({cell.strip()})")
+    if abs(value) > LARGEST:
+        raise _Unusable(f"{name} is beyond {LARGEST:g} ({cell.strip()})")
     return value
 
 

@@ -7,11 +7,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Fiel
 from pydantic_core import PydanticCustomError
 
 # No length or angle of a file is beyond this in any unit; it keeps products of lengths finite.
-FAR = 1e9
+LARGEST = 1e9
 
-Number = Annotated[float, Field(ge=-FAR, le=FAR, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=FAR, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, le=FAR, allow_inf_nan=False)]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=2)]

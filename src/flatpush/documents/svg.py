@@ -284,14 +284,14 @@ class _Reader:
     def viewport(self, element: Element, state: _State, given: Mapping[str, str]) -> _State:
         """The state inside a nested drawing or a symbol."""
         whole = {"width": "100%", "height": "100%"}
-        asked = Element(element.tag, {**whole, **given}, element.line)
+        placed = Element(element.tag, {**whole, **given}, element.line)
         x, y = (0.0, 0.0)
         if element.tag == "svg":
-            x, y = (self.length(asked, key, state, axis) for axis, key in enumerate(("x", "y")))
-        box = view_box(asked)
+            x, y = (self.length(placed, key, state, axis) for axis, key in enumerate(("x", "y")))
+        box = view_box(placed)
         try:
             width, height = (
-                self.length(asked, key, state, axis) for axis, key in enumerate(("width", "height"))
+                self.length(placed, key, state, axis) for axis, key in enumerate(("width", "height"))
             )
         except ValueError:
             if box is not None:

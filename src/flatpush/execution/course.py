@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry import wrap_angle
 from ..geometry.pose import Array
-from ..planning.transits import Way
+from ..planning.transits import PusherPath
 from ..problem import Plan, Pusher, TransitSegment
 from .robot import Limits, OutOfLimits
 
@@ -168,7 +168,7 @@ def approach(tool: Array, goal: Array, lift: float, pusher: Pusher, reach: float
         return Course(
             np.array([0.0, 1e-3]), np.array([tool, tool]), np.zeros(2, np.intp), ("approach",), (-1,)
         )
-    way = Way(poses[moves], heights[moves], reach).segment(pusher, np.zeros(3))
+    way = PusherPath(poses[moves], heights[moves], reach).segment(pusher, np.zeros(3))
     table = np.column_stack([way.pusher[:, :2], way.height, way.pusher[:, 2]])
     return Course(way.times, table, np.zeros(len(way.times), np.intp), ("approach",), (-1,))
 

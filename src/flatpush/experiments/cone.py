@@ -108,9 +108,9 @@ def run(folder: Path | None = None, queries: int = QUERIES) -> str:
 
 
 def _radii(case: Case, two_finger: str) -> str:
-    asked = scene(case, np.zeros(3), two_finger, 0.0)
-    assert not isinstance(asked.pushes, str)
-    cars = [push_option(asked, push).car for push in asked.pushes]
+    query = scene(case, np.zeros(3), two_finger, 0.0)
+    assert not isinstance(query.pushes, str)
+    cars = [push_option(query, push).car for push in query.pushes]
     return " ".join("—" if car is None else f"{1000 * car.radius:.1f}" for car in cars)
 
 
@@ -119,5 +119,5 @@ def _figure(case: Case, path: Path) -> None:
     from ..view import describe_figure
     from ..view.sketches import sketches
 
-    asked = scene(case, np.zeros(3), "cone", MARGIN)
-    describe_figure(asked, sketches(asked, describe(asked)), path)
+    query = scene(case, np.zeros(3), "cone", MARGIN)
+    describe_figure(query, sketches(query, describe(query)), path)

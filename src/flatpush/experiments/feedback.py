@@ -38,7 +38,7 @@ Law = Literal["horizon", "path", "dfl"]
 Disturbance = Literal["", "displaced", "lost"]
 
 RUNS, SEED = 200, 0
-FAR = 0.3  # of the starts [m]
+START_DISTANCE = 0.3  # of the starts [m]
 WEIGHTS, CENTRE, FRICTION = 0.2, 0.02, 0.2
 FOOT = 0.004  # between the feet that a spread pressure is replaced by [m]
 WITHIN = (0.002, float(np.deg2rad(2.0)))
@@ -112,7 +112,7 @@ def task(number: int, seed: int = SEED, near: float = 0.0) -> Task:
     """
     rng = np.random.default_rng([seed, number])
     thing, places = objects()[number % 4]
-    angle, far = rng.uniform(-np.pi, np.pi), np.sqrt(rng.uniform(near**2, FAR**2))
+    angle, far = rng.uniform(-np.pi, np.pi), np.sqrt(rng.uniform(near**2, START_DISTANCE**2))
     start = (far * np.cos(angle), far * np.sin(angle), rng.uniform(-np.pi, np.pi))
     pushes = tuple(Push(name, thing.outline.nearest(place)) for name, place in places.items())
     planning = Planning(friction_margin=0.4, iterations=1)
@@ -191,18 +191,18 @@ def controlled(law: Law, learn: bool, scene: Scene, rate: float) -> AbstractCont
 
 
 def attempt(
-    asked: Task, law: Law = "horizon", learn: bool = True, disturbance: Disturbance = "", rate: float = 60.0
+    given: Task, law: Law = "horizon", learn: bool = True, disturbance: Disturbance = "", rate: float = 60.0
 ) -> tuple[Ended, ClosedLoopRun | None]:
     """Runs one task; without a run if the controller refuses it or breaks off with an error."""
-    scene = asked.scene
+    scene = given.scene
     try:
         controller = controlled(law, learn, scene, rate)
     except FlatpushError as error:
         return Ended(np.inf, np.inf, f"refused: {error}", 0, 0.0), None
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(given.seed)
     far = float(np.hypot(*scene.start_pose[:2]))
     after, side = rng.uniform(0.2, 0.8) * far / scene.pusher.speed, rng.choice([-1.0, 1.0])
-    plant = DisturbedPlant(asked.truth, scene.pusher.tip_radius, disturbance, after, side)
+    plant = DisturbedPlant(given.truth, scene.pusher.tip_radius, disturbance, after, side)
     hand = compose(scene.start_pose, [-2 * scene.object.outline.size, 0.0, 0.0])
     landings = 0
 
@@ -264,8 +264,8 @@ class _Job:
 
     def ended(self) -> Ended | None:
         """None where no push can be steered."""
-        asked = task(self.number, self.seed, self.near)
-        return attempt(asked, self.law, self.learn, self.disturbance)[0] if asked.steerable else None
+        given = task(self.number, self.seed, self.near)
+        return attempt(given, self.law, self.learn, self.disturbance)[0] if given.steerable else None
 
 
 def _ended(job: _Job) -> Ended | None:

@@ -42,8 +42,8 @@ def run(folder: Path | None = None) -> str:
     ]
     for name, scene in cases():
         for model in MODELS:
-            asked = Scene(scene.object, scene.start, scene.goal, scene.pusher, planning=Planning(model=model))
-            found = plan(asked)
+            query = Scene(scene.object, scene.start, scene.goal, scene.pusher, planning=Planning(model=model))
+            found = plan(query)
             if found.certificate is None:
                 lines.append(f"{name:<24} {model:<10} no plan")
                 continue

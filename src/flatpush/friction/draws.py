@@ -23,7 +23,7 @@ from .surface import LimitSurface
 
 DF = 50.0
 _RANGE = 1e-8  # eigenvalues of Q below this part of the largest count as zero: a draw stays on that face
-_INSIDE = 1 - 1e-9
+_WITHIN_BOUNDARY = 1 - 1e-9
 
 
 def draw_surface(surface: LimitSurface, rng: np.random.Generator, df: float = DF) -> LimitSurface:
@@ -86,8 +86,8 @@ class SurfaceDraws:
         sign = 1.0 if rng.random() < 0.5 else -1.0
         move = np.tensordot(directions, S, axes=2)
         reach = float(np.max(np.abs(np.linalg.eigvalsh(np.tensordot(move, directions, axes=1)))))
-        cut = reach > _INSIDE
-        return sign * move * (_INSIDE / reach if cut else 1.0), cut
+        cut = reach > _WITHIN_BOUNDARY
+        return sign * move * (_WITHIN_BOUNDARY / reach if cut else 1.0), cut
 
     @cached_property
     def _units(self) -> Array:

@@ -18,7 +18,7 @@ from .support import Support
 from .surface import LimitSurface
 
 _LEAST_SCALE = 1e-3  # of a predicted twist, so that the zero gradient explains nothing
-_INSIDE = 1e-6  # least eigenvalue asked for: strictly convex, invertible
+_LEAST_EIGENVALUE = 1e-6  # least eigenvalue asked for: strictly convex, invertible
 _OCTANT = 20
 
 
@@ -255,7 +255,7 @@ def _program(
     rows.dense(np.concatenate([np.zeros((1, count)), -norm]))
     rows.end(np.zeros(1 + count))
     rows.dense(-gram)
-    rows.end(-_INSIDE * svec(np.eye(size)))
+    rows.end(-_LEAST_EIGENVALUE * svec(np.eye(size)))
     cones = [("positive", 3 * n), *[("norm", 4)] * n, ("norm", 1 + count), ("psd", size)]
     cost = np.concatenate(
         [

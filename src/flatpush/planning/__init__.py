@@ -1,8 +1,8 @@
 """From a scene to a plan: push points, one push or many, transits, timing."""
 
 from .candidates import automatic_pushes
+from .controllability import controllability
 from .description import PushDescription, describe
-from .freedom import freedom
 from .options import PushOption, push_options
 from .planner import Planner, plan
 
@@ -11,8 +11,8 @@ __all__ = [
     "PushDescription",
     "PushOption",
     "automatic_pushes",
+    "controllability",
     "describe",
-    "freedom",
     "plan",
     "push_options",
 ]

@@ -23,7 +23,7 @@ from .transits import Transits
 # improvement of at least BETTER.
 WORK, PATIENCE = 30, 4
 BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
-FAR = 1.0  # clearances beyond it are not told apart [m]
+LARGEST_GAP = 1.0  # clearances beyond it are not told apart [m]
 SAMPLES = 7  # points of an edge that is drawn
 Progress = Callable[[float, float, int], object]
 
@@ -188,9 +188,11 @@ def hand_clearance(scene: Scene, world: World, segments: Segments) -> float:
             best = min(best, float(inside) - bow)
             for k, m in _stretches(points, segment.height):
                 at, (dx, dy) = np.array([*points[k], 0.0]), points[m] - points[k]
-                gap = pose_gap(arrays, tip.arrays, at, FAR, -np.inf)
+                gap = pose_gap(arrays, tip.arrays, at, LARGEST_GAP, -np.inf)
                 if np.hypot(dx, dy) > 0:
-                    gap = min(gap, twist_gap(arrays, tip.arrays, at, np.array([dx, dy, 0.0]), FAR, -np.inf))
+                    gap = min(
+                        gap, twist_gap(arrays, tip.arrays, at, np.array([dx, dy, 0.0]), LARGEST_GAP, -np.inf)
+                    )
                 best = min(best, float(gap) - bow)
     return best
 

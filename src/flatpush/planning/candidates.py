@@ -27,7 +27,7 @@ ASIDE = (0.3, 2, -2, 6, -6, 12, -12)
 FEW = 20
 EQUAL = 1e-7  # radii that differ by this part are equal
 # What of how to plan makes a push a good one.
-ASKED = "model", "two_finger", "friction_margin", "cost"
+GOODNESS_KEYS = "model", "two_finger", "friction_margin", "cost"
 Found = tuple[tuple[Push, ...], tuple[PushOption, ...]]
 _known: WeakKeyDictionary[Object, dict[tuple[Any, ...], Found]] = WeakKeyDictionary()
 
@@ -83,11 +83,11 @@ def automatic_pushes(scene: Scene) -> Found:
     directions, smaller turning radii first. They are sought once for an object: scenes that differ only in their
     poses, their workspace or how the search is done share them.
     """
-    asked = scene.pusher, *(getattr(scene.planning, key) for key in ASKED)
+    query = scene.pusher, *(getattr(scene.planning, key) for key in GOODNESS_KEYS)
     known = _known.setdefault(scene.object, {})
-    if asked not in known:
-        known[asked] = _automatic_pushes(scene)
-    return known[asked]
+    if query not in known:
+        known[query] = _automatic_pushes(scene)
+    return known[query]
 
 
 def _automatic_pushes(scene: Scene) -> Found:

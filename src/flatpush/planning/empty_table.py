@@ -31,11 +31,11 @@ class Found:
     details: dict[str, Any] = field(default_factory=dict)
 
 
-def direct_paths(fleet: Fleet, start: Array, ends: Array) -> list[Path]:
+def direct_paths(fleet: Fleet, start: Array, endpoints: Array) -> list[Path]:
     """All words of all pushes from the start to where each of them is to end, poses X_WO, cheapest first."""
     found = []
     for push in range(fleet.size):
-        for word in words(fleet.left[push], fleet.right[push], fleet.direction[push], start, ends[push]):
+        for word in words(fleet.left[push], fleet.right[push], fleet.direction[push], start, endpoints[push]):
             pieces = [
                 (push, "LSR".index(x), float(p)) for x, p in zip(word.word, word.parameters, strict=True)
             ]

@@ -21,9 +21,9 @@ from .among_obstacles import AmongObstacles, Progress
 from .answer import Answer
 from .assembly import Segments, assemble, car_of
 from .candidates import automatic_pushes
+from .controllability import Controllability, controllability
 from .empty_table import ROUND, Found, direct_paths, refined_paths
 from .fleets import fleet_of
-from .freedom import Freedom, freedom
 from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
@@ -43,7 +43,7 @@ class Planner:
     Attributes:
         scene: with its pushes listed.
         options: the pushes as cars, or why they are none; left_out: automatic candidates that were dropped.
-        freedom: whether the pushes move the object "free"-ly, by "detours", or not ("none").
+        controllability: whether the pushes move the object "free"-ly, by "detours", or not ("none").
         explored: after a search among obstacles, paths of the COF along edges of its tree, shape (m, k, 2) [m].
 
     >>> import flatpush as fp
@@ -65,8 +65,8 @@ class Planner:
         self._among: AmongObstacles | None = None
 
     @property
-    def freedom(self) -> Freedom:
-        return freedom([car_of(option) for option in self.usable])
+    def controllability(self) -> Controllability:
+        return controllability([car_of(option) for option in self.usable])
 
     @property
     def reasons(self) -> dict[str, str]:
@@ -153,8 +153,8 @@ class Planner:
 
     def _candidates(self, scene: Scene) -> Iterator[Found]:
         """The cheapest single push, then what the refinement finds; all words of the push if it is the only one."""
-        ends = self._ends(scene)
-        singles = direct_paths(self.fleet, scene.start_pose, ends)
+        endpoints = self._endpoints(scene)
+        singles = direct_paths(self.fleet, scene.start_pose, endpoints)
         several = len(self.usable) > 1
         single = {"single_cost": singles[0].cost}
         for path in singles[:1] if several else singles:
@@ -164,7 +164,7 @@ class Planner:
                 found.details.update(single)
                 yield found
 
-    def _ends(self, scene: Scene) -> Array:
+    def _endpoints(self, scene: Scene) -> Array:
         """For every push where it best ends: the goal, or with the cheapest angle where any will do, shape (k, 3)."""
         if not scene.free_angle:
             return np.tile(scene.goal_pose, (self.fleet.size, 1))

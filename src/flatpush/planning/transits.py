@@ -23,7 +23,7 @@ WIDER = 1 / np.cos(np.pi / (4 * ARC_SEGMENTS))
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class PusherPath:
     """Straight stretches of the pusher beside an object at rest: poses X_OE (n, 3) and heights (n,), from rest to rest.
 
     Attributes:
@@ -73,8 +73,8 @@ class Way:
             laws.append(Trapezoid(float(length), float(speed), most))
         return laws
 
-    def reversed(self) -> "Way":
-        return Way(self.poses[::-1].copy(), self.heights[::-1].copy(), self.reach)
+    def reversed(self) -> "PusherPath":
+        return PusherPath(self.poses[::-1].copy(), self.heights[::-1].copy(), self.reach)
 
     def segment(self, pusher: Pusher, X_WO: Array) -> TransitSegment:
         """The way beside an object at a pose, timed."""
@@ -117,7 +117,7 @@ class Transits:
         self.pusher, self.outline = scene.pusher, scene.object.outline
         self.gap = max(scene.planning.clearance, LEAST_GAP)
 
-    def landing(self, placement: Placement) -> Way:
+    def landing(self, placement: Placement) -> PusherPath:
         """From above the landing place (planar: from beside) onto the contact, straight along the push direction.
 
         A finger that keeps its direction comes square to the outline where it touches.
@@ -129,9 +129,9 @@ class Transits:
         poses, heights = [back, placement.pose], [0.0, 0.0]
         if self.pusher.transit == "lift":
             poses, heights = [back, *poses], [self.pusher.lift, *heights]
-        return Way(np.array(poses), np.array(heights), self._reach(placement))
+        return PusherPath(np.array(poses), np.array(heights), self._reach(placement))
 
-    def between(self, first: Placement, second: Placement) -> Way:
+    def between(self, first: Placement, second: Placement) -> PusherPath:
         """From one contact to another.
 
         Raises:
@@ -145,14 +145,14 @@ class Transits:
         if self.pusher.transit == "lift":
             up = self.pusher.lift
             over = np.array([first.pose, a, a, b, b, end])
-            return Way(over, np.array([0.0, 0.0, up, up, 0.0, 0.0]), reach)
+            return PusherPath(over, np.array([0.0, 0.0, up, up, 0.0, 0.0]), reach)
         away, before = self._clear(first, reach), self._clear(second, reach)
         points = self._around(away[:2], before[:2], reach)
         steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
         share = steps / steps[-1] if steps[-1] > 0 else np.linspace(0, 1, len(points))
         middle = np.column_stack([points, a[2] + turn * share])
         poses = np.concatenate([[first.pose], middle, [end]])
-        return Way(poses, np.zeros(len(poses)), reach)
+        return PusherPath(poses, np.zeros(len(poses)), reach)
 
     def _back(self, placement: Placement, distance: float) -> Array:
         """The pose X_OE at a distance straight back from a contact."""

@@ -11,13 +11,13 @@ from .scene import Object, Scene
 
 # An origin further from the object than so many of its sizes is moved. A plan's samples are poses of the origin: the
 # further it is, the denser they must be, and the more digits are lost.
-FAR = 100.0
+FAR_SIZES = 100.0
 
 
 def far_origin(outline: Outline) -> Array | None:
     """Where the frame O moves to, shape (2,) in O [m]: the outline's centroid; None if its origin is not far."""
     centroid = outline.centroid
-    return centroid if np.hypot(*centroid) > FAR * outline.size else None
+    return centroid if np.hypot(*centroid) > FAR_SIZES * outline.size else None
 
 
 def moved_inside(scene: Scene) -> Scene:

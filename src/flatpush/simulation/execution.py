@@ -20,7 +20,7 @@ from .pieces import progress, turns_along
 
 Segment = PushSegment | TransitSegment
 # Straight interpolation stays so near the arcs [m, rad].
-NEAR, NEAR_ANGLE = 5e-5, float(np.deg2rad(0.05))
+SAMPLING, SAMPLING_ANGLE = 5e-5, float(np.deg2rad(0.05))
 # Places agree to so much where one motion follows another [m, rad]; documents hold all digits.
 SAME = 1e-9
 # A limit may be passed by this part, and by what the rounding of places (in parts of their size) makes of it.
@@ -160,7 +160,7 @@ def _held(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
         return
     outline, radius = scene.object.outline, scene.pusher.tip_radius
     between = relative(_halfway(segment.object), _halfway(segment.pusher))
-    for name, poses, near in (("samples", on, SAME), ("between samples", between, NEAR)):
+    for name, poses, near in (("samples", on, SAME), ("between samples", between, SAMPLING)):
         gaps = np.array([abs(outline.nearest(X[:2]).distance - radius) for X in poses])
         yield Finding(f"rolling fingertip off the outline, {name}", *_most(MM * gaps, "mm", MM * near, label))
 
@@ -196,7 +196,7 @@ def _follows(segment: PushSegment, label: str) -> Iterator[Finding]:
             straight = (1 - share) * poses[:-1] + share * poses[1:]
             error = np.abs(straight - target)
             far, turned = MM * np.hypot(*error[:, :2].T), DEGREES * error[:, 2]
-            near, near_angle = (SAME, SAME) if ends else (NEAR, NEAR_ANGLE)
+            near, near_angle = (SAME, SAME) if ends else (SAMPLING, SAMPLING_ANGLE)
             what = "samples beside their arc" if ends else "straight lines between samples beside their arc"
             yield Finding(f"{name}: {what}", *_most(far, "mm", MM * near, label))
             yield Finding(f"{name}: {what}, turn", *_most(turned, "°", DEGREES * near_angle, label))

@@ -16,7 +16,7 @@ from .plant import MODES, Plant
 # push does not tell: it often changes a row before the pusher does.
 GAP = 1.0  # [s]
 JUMP = 0.009  # [m]
-TURN = 0.5  # [rad]
+TURN_JUMP = 0.5  # [rad]
 # An object that was last seen so long before the end has no final pose [s].
 UNSEEN = 0.5
 
@@ -91,7 +91,7 @@ class Recording:
             )
         step = np.diff(run.hands[1:], axis=0)
         cut = (np.diff(run.times[1:]) > GAP) | (np.hypot(step[:, 0], step[:, 1]) > JUMP)
-        cut |= np.abs(wrap_angle(step[:, 2])) > TURN
+        cut |= np.abs(wrap_angle(step[:, 2])) > TURN_JUMP
         edges = [1, *(np.flatnonzero(cut) + 2).tolist(), len(run.times)]
         return cls(run, tuple(pairwise(edges)))
 

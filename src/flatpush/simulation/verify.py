@@ -86,10 +86,10 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
     tolerance = np.array(plan.scene.planning.goal_tolerance)
     excess = float(np.max(goal / tolerance))
     claims.append(Claim("reaches the goal", None, excess, 1.0, excess <= 1.0, "within the goal tolerance"))
-    asked = plan.scene.planning.friction_margin
+    required = plan.scene.planning.friction_margin
     for key, least in (
-        ("friction_margin", asked),
-        ("spacing_margin", asked),
+        ("friction_margin", required),
+        ("spacing_margin", required),
         ("motion_cone_margin_degrees", 0.0),
     ):
         value = getattr(computed, key)

@@ -10,6 +10,7 @@ start and of the goal, and whatever is tried is accepted by where it ends, never
 """
 
 import cmath
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -20,7 +21,6 @@ from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
 from .checked import checked_radius, finite_poses, shaped_poses
 
-TURN = 2 * np.pi
 # A path is accepted if it ends within this of the goal, per (radius + city-block distance of start and goal).
 # The heading is always met. It lies above the rounding of sane input and below the 1e-9 that is promised.
 TOLERANCE = 4e-10
@@ -121,7 +121,7 @@ def shortest_length(starts: ArrayLike, goals: ArrayLike, radius: float) -> Array
 def _shortest(start: Array, goal: Array, radius: float) -> tuple[str, tuple[float, float, float]]:
     """Word and arcs of the shortest path, in units of the radius."""
     w = complex(*(goal[:2] - start[:2])) * cmath.exp(-1j * start[2]) / radius
-    delta = float(goal[2] - start[2]) % TURN
+    delta = float(goal[2] - start[2]) % math.tau
     tolerance = TOLERANCE * (1 + abs(w.real) + abs(w.imag))
     candidates = [(word, arcs) for word, arcs in _words(w, delta) if abs(_end(word, arcs) - w) <= tolerance]
     return min(candidates, key=lambda candidate: sum(candidate[1]))
@@ -130,7 +130,7 @@ def _shortest(start: Array, goal: Array, radius: float) -> tuple[str, tuple[floa
 def _words(w: complex, delta: float) -> Iterator[tuple[str, tuple[float, float, float]]]:
     """All candidates from (0, 0, 0) to (w, delta). Words with R first are mirror images of those with L."""
     yield from _left_words(w, delta)
-    for word, arcs in _left_words(w.conjugate(), -delta % TURN):
+    for word, arcs in _left_words(w.conjugate(), -delta % math.tau):
         yield word.translate(_MIRROR), arcs
 
 
@@ -139,18 +139,18 @@ def _left_words(w: complex, delta: float) -> Iterator[tuple[str, tuple[float, fl
     D = (w + 1j * e) - 1j  # from the left circle of the start to that of the goal
     straight = abs(D)
     for heading in (cmath.phase(D), 0.0, delta):
-        yield "LSL", (heading % TURN, straight, (delta - heading) % TURN)
+        yield "LSL", (heading % math.tau, straight, (delta - heading) % math.tau)
 
     # The middle circle touches both from outside; the arc on it takes the long way round ([Shkel2001]).
     apex = 2 * np.arcsin(min(1.0, straight / 4))
-    middle = TURN - apex
+    middle = math.tau - apex
     for heading in (cmath.phase(D) + middle / 2, 0.0, delta + middle):
-        yield "LRL", (heading % TURN, middle, (delta + middle - heading) % TURN)
+        yield "LRL", (heading % math.tau, middle, (delta + middle - heading) % math.tau)
 
     D = (w - 1j * e) - 1j  # to the right circle of the goal: D = (straight - 2i) exp(i heading)
     straight = max(0.0, abs(D) ** 2 - 4) ** 0.5
     for heading in (cmath.phase(D * (straight + 2j)), 0.0, delta):
-        yield "LSR", (heading % TURN, straight, (heading - delta) % TURN)
+        yield "LSR", (heading % math.tau, straight, (heading - delta) % math.tau)
 
 
 def _end(word: str, arcs: tuple[float, float, float]) -> complex:

@@ -13,7 +13,7 @@ from .vectors.kernels import SLACK, TURN, _large, _ratio, _select, _small, _turn
 
 TOLERANCE = 4e-10  # as in dubins.py; of a length, per length of the query
 LOOSE = 2e-10  # as in three_twist.py, where a length is that of the centres as well
-NEAR = 4 * TOLERANCE  # where what is compared is four times a length, or a square of about four
+SQUARE_TOLERANCE = 4 * TOLERANCE  # where what is compared is four times a length, or a square of about four
 NEVER = 1e300
 TINY = 1e-30
 
@@ -127,24 +127,24 @@ def dubins_between(i: Frame, j: Frame) -> float:
     after, before, ahead = ym * lrl - xm * lsl, pm * lrl - qm * lsl, fm * lrl + em * lsl
     miss = _select(outer < math.pi, _large(_large(after, before), ahead), _small(after, before))
     length = outer + (lrl * ratio + math.pi)
-    length = _select(miss > NEAR, length + TURN, length)
-    best = _select(lrl2 >= -NEAR, _small(best, length), best)
+    length = _select(miss > SQUARE_TOLERANCE, length + TURN, length)
+    best = _select(lrl2 >= -SQUARE_TOLERANCE, _small(best, length), best)
     ratio = _ratio(0.25 * rsr - 0.5)
     outer = rlr * ratio - turn
     outer = _select(outer < 0.0, outer + TURN, outer)
     after, before, ahead = yp * rlr + xp * rsr, pp * rlr + qp * rsr, ep * rsr - fp * rlr
     hit = _select(outer < math.pi, _small(_small(after, before), ahead), _large(after, before))
     length = outer + (rlr * ratio + math.pi)
-    length = _select(hit < -NEAR, length + TURN, length)
-    best = _select(rlr2 >= -NEAR, _small(best, length), best)
+    length = _select(hit < -SQUARE_TOLERANCE, length + TURN, length)
+    best = _select(rlr2 >= -SQUARE_TOLERANCE, _small(best, length), best)
 
     # The rest of LSR and RSL comes last: with this order the division is done by then.
     first = _turned(a_tangent, ax, ay)
     length = lsr + first + _remaining(first, delta)
-    best = _select(m - g >= -NEAR, _small(best, length), best)
+    best = _select(m - g >= -SQUARE_TOLERANCE, _small(best, length), best)
     first = _turned(b_tangent, bx, by)
     length = rsl + first + _remaining(first, back)
-    return _select(m + g >= -NEAR, _small(best, length), best)
+    return _select(m + g >= -SQUARE_TOLERANCE, _small(best, length), best)
 
 
 @block
@@ -162,11 +162,11 @@ def three_twist_between(i: Frame, j: Frame, car: Weighted) -> float:
     straight, same, z, long, short = for_left[:5]
     best = ws * straight + wl * same
     cost = _small(wr * (TURN - z) + wl * long, wr * z + wl * short)
-    best = _select(straight <= 4.0 + NEAR, _small(best, cost), best)
+    best = _select(straight <= 4.0 + SQUARE_TOLERANCE, _small(best, cost), best)
     straight, same, z, long, short = for_right[:5]
     best = _small(best, ws * straight + wr * same)
     cost = _small(wl * (TURN - z) + wr * long, wl * z + wr * short)
-    best = _select(straight <= 4.0 + NEAR, _small(best, cost), best)
+    best = _select(straight <= 4.0 + SQUARE_TOLERANCE, _small(best, cost), best)
     lsr, rsl, other = _unlike(x, y, c, s, delta, tilt_c, tilt_s)
     best = _small(best, ws * lsr.way + (wl * lsr.first + wr * lsr.last) + lsr.unfit)
     best = _small(best, ws * rsl.way + (wr * rsl.first + wl * rsl.last) + rsl.unfit)
@@ -212,7 +212,7 @@ def _timed_alike(found: Any, delta: float, outer: Law, straight: Law, middle: La
     cost = _time(outer, first) + _time(middle, TURN - z) + _time(outer, long - first)
     first = _first(nx, ny, way, short, d_short, tolerance)
     cost = _small(cost, _time(outer, first) + _time(middle, z) + _time(outer, short - first))
-    return _select(way <= 4.0 + NEAR, _small(best, cost), best)
+    return _select(way <= 4.0 + SQUARE_TOLERANCE, _small(best, cost), best)
 
 
 @block
@@ -298,9 +298,9 @@ def _unlike(
     b = _turned(_small(abs(bx), abs(by)) * (a_big * o_big * inverse), bx, by)
     o = _turned(_small(abs(ox), abs(oy)) * (a_big * b_big * inverse), ox, oy)
     l_way, r_way, o_way = l_way + lean, r_way - lean, abs(lean) - o_way
-    l_fit = _select(_small(l_rest, l_way) >= -NEAR, 0.0, NEVER)
-    r_fit = _select(_small(r_rest, r_way) >= -NEAR, 0.0, NEVER)
-    o_fit = _select(_small(o_rest, o_way) >= -NEAR, 0.0, NEVER)
+    l_fit = _select(_small(l_rest, l_way) >= -SQUARE_TOLERANCE, 0.0, NEVER)
+    r_fit = _select(_small(r_rest, r_way) >= -SQUARE_TOLERANCE, 0.0, NEVER)
+    o_fit = _select(_small(o_rest, o_way) >= -SQUARE_TOLERANCE, 0.0, NEVER)
     return (
         Pieces(a, _large(l_way, 0.0), _remaining(a, delta), l_fit),
         Pieces(b, _large(r_way, 0.0), _remaining(b, back), r_fit),

@@ -26,7 +26,6 @@ from ..arguments import vector
 from ..errors import InputError
 from ..geometry.pose import Array, compose, exp
 
-TURN = 2 * math.pi
 TOLERANCE = (
     1e-10  # of the end, per length of the query (distance + distance of the centres); 1e-9 is promised
 )
@@ -145,7 +144,7 @@ def _middles(car: _Car, name: str, X: complex, theta: float) -> Iterator[float]:
         yield from (longer, shorter) if shorter < longer else (longer,)
     else:
         apex = 2 * math.asin(min(1.0, abs(w) / (2 * abs(car.left - car.right))))
-        yield from (apex, TURN - apex)
+        yield from (apex, math.tau - apex)
 
 
 def _accepted(car: _Car, name: str, middle: float, X: complex, theta: float) -> Iterator[Parameters]:
@@ -161,9 +160,9 @@ def _accepted(car: _Car, name: str, middle: float, X: complex, theta: float) -> 
     for alpha in (cmath.phase(w) - cmath.phase(arm), 0.0, theta - turned):
         if abs(cmath.exp(1j * alpha) * arm - w) <= TOLERANCE * scale:
             yield (
-                SENSE[name[0]] * alpha % TURN,
+                SENSE[name[0]] * alpha % math.tau,
                 middle,
-                SENSE[name[2]] * (theta - turned - alpha) % TURN,
+                SENSE[name[2]] * (theta - turned - alpha) % math.tau,
             )
 
 

@@ -23,7 +23,9 @@ from .plan_figure import cone_length
 from .push_sketch import PushSketch
 from .table import MM, tip_size
 
-FAR = 6.0  # sizes of the object; turning centres further from the centre of friction are only pointed at
+MOST_SIZES = (
+    6.0  # sizes of the object; turning centres further from the centre of friction are only pointed at
+)
 REGION = 2.2  # sizes of the object to both sides, in which the centres of two fingers are shown
 ROW, CAPTION = 190.0, 32.0  # height of the axes of a row, and of the words above them [pt]
 BODY = Look(INK, 1.4, fill="#f1f1ef")
@@ -319,7 +321,7 @@ def _centres_box(scene: Scene, sketch: PushSketch) -> Box:
     shown = [outline, sketch.fingertips - sketch.tip_radius, sketch.fingertips + sketch.tip_radius]
     shown.append(_ahead(scene, sketch)[None])
     for place in (sketch.left_centre, sketch.right_centre, sketch.flat_point, sketch.drive_centre):
-        if np.all(np.isfinite(place)) and np.linalg.norm(place - cof) <= FAR * size:
+        if np.all(np.isfinite(place)) and np.linalg.norm(place - cof) <= MOST_SIZES * size:
             # Beyond a centre there must be room to see where its ray goes.
             shown.append((cof + 1.15 * (place - cof))[None])
     if sketch.region is not None:

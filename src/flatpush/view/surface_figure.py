@@ -22,7 +22,7 @@ COLOURS = {"ellipsoid": palette.PUSHES[1], "quartic": palette.GOAL, "loads": pal
 # Of angles from 0 to WORST: after the map viridis of S. van der Walt and N. Smith, from light to dark.
 SHADES = ("#fde725", "#90d743", "#35b779", "#21918c", "#31688e", "#443983", "#440154")
 WORST = 30.0  # [°]
-NEAR = np.sin(np.radians(20.0))  # data this close to a plane stand beside its section
+NEAR_PLANE = np.sin(np.radians(20.0))  # data this close to a plane stand beside its section
 COARSE, FINE = (15, 25), 121
 VIEW = np.radians(22.0), np.radians(-55.0)  # from which the surface is seen: elevation, azimuth
 SKIN = Look("#5d86b3", 0.3, opacity=0.7, fill="#9fc2e8", fill_opacity=0.24)
@@ -207,7 +207,7 @@ def _draw_section(
         P = _boundary(surface, size, directions, length)
         panel.line(P[:, [i, j]], Look(COLOURS.get(name, INK), 1.6), 3)
     F, V = _data(pairs, length)
-    near = np.abs(F[:, 3 - i - j]) <= NEAR * np.linalg.norm(F, axis=1)
+    near = np.abs(F[:, 3 - i - j]) <= NEAR_PLANE * np.linalg.norm(F, axis=1)
     for force, twist in zip(F[near][:, [i, j]], V[near][:, [i, j]], strict=True):
         panel.arrow(force, force + 0.22 * reach * twist, SOFT, 0.9, 5)
         panel.disc(force, 2.2, Look("#ffffff", 0.4, fill=INK), 6)

@@ -163,5 +163,5 @@ def drift_of(car: Car, model: SteeringModel) -> Array:
         turns.append(float(V[2]) / ahead)
         drifts.append(float(cross(h, v)) / ahead)
     order = np.argsort(turns)
-    asked = np.linspace(-model.right, model.left, _SAMPLES)
-    return np.interp(asked, np.array(turns)[order], np.array(drifts)[order])
+    curvatures = np.linspace(-model.right, model.left, _SAMPLES)
+    return np.interp(curvatures, np.array(turns)[order], np.array(drifts)[order])

@@ -32,9 +32,9 @@ BRAKE = 0.6
 # Frames averaged over an object at rest.
 FRAMES = 10
 # The share of the tolerance that an average of these frames has to keep.
-INSIDE = 0.85
+GOAL_SHARE = 0.85
 # A finger that had lost the edge has it again when it is as near as this [m].
-NEAR = 0.0001
+REGAINED = 0.0001
 # Where the car of a contact that slipped turns so much less tightly than where it landed, another landing is better.
 WORSE = 2.5
 # Contacts are found again so often in one push before another landing is tried.
@@ -193,7 +193,7 @@ class HorizonController(AbstractController[HorizonState]):
         off = float(np.hypot(error[0], error[1])), abs(float(error[2]))
         inside = max(off[0] / self.tolerance[0], off[1] / self.tolerance[1])
         text = f"{1000 * off[0]:.2f} mm and {np.rad2deg(off[1]):.2f}° off the goal"
-        if inside <= INSIDE:
+        if inside <= GOAL_SHARE:
             return replace(state, mode="done", note=text, outcome=ARRIVED), self._standing(state)
         if state.landings >= self.landings:
             why = ARRIVED if inside <= 1 else f"still {text} after {state.landings} landings"
@@ -372,7 +372,7 @@ class HorizonController(AbstractController[HorizonState]):
         tip = relative(pose, hand)[:2]
         _, normal, distance = nearest_contact(self.scene.object.outline, tip)
         gap = distance - self.scene.pusher.tip_radius
-        if gap <= NEAR:
+        if gap <= REGAINED:
             back = Measurement(time, pose, hand)
             state = replace(state, phase="push", tip=tip, gap=0.0, believed=back, frames=(), expected=None)
             return self._push(replace(state, car=self.observer.car(state, state.push, tip)), time)

@@ -161,8 +161,8 @@ class TrackingController(_Linearised):
         begun, done = state.seen.told[-1]
         share = 1.0
         if not np.array_equal(done, state.wanted):
-            asked, left = (self._flat_speed(u, pose, time - begun) for u in (state.wanted, done))
-            share = min(max(left / asked, 0.0), MOST_SHARE) if asked > 0 else 0.0
+            wanted, left = (self._flat_speed(u, pose, time - begun) for u in (state.wanted, done))
+            share = min(max(left / wanted, 0.0), MOST_SHARE) if wanted > 0 else 0.0
         return replace(state, clock=state.clock + share * state.pace * (time - begun))
 
     def _flat_speed(self, velocity: Array, pose: Array, dt: float) -> float:

@@ -187,8 +187,8 @@ def rollout(
         worst = max(worst, off)
         hold = loop.hold if loop.law == DFL else RAMP
         ux, uy = point_velocity(heading, out, omega, rx, ry, mt, dt, hold)
-        asked = HandMotion(ux, uy, omega, 0.0)
-        last = kept_motion(last, asked, mt, dt, tips, loop.limits)
+        wanted = HandMotion(ux, uy, omega, 0.0)
+        last = kept_motion(last, wanted, mt, dt, tips, loop.limits)
         share = 1.0
         if last.vx != ux or last.vy != uy:
             middle = mt + 0.5 * last.spin * dt

@@ -111,8 +111,8 @@ class SteeringModel:
             drifts.append(float(v @ n) / float(v @ h))
         left, right = EDGE * max(turns), -EDGE * min(turns)
         order = np.argsort(turns)
-        asked = np.linspace(-right, left, _FINE)
-        drift = np.interp(asked, np.array(turns)[order], np.array(drifts)[order])
+        curvatures = np.linspace(-right, left, _FINE)
+        drift = np.interp(curvatures, np.array(turns)[order], np.array(drifts)[order])
         return cls(z, angle, left, right, car.contact.point + car.cof, car.pusher, True, drift)
 
     @classmethod

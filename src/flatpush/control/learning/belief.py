@@ -40,7 +40,7 @@ STANDS_OUT = 4.0
 # The estimate counts as better than the prior when it knows the heading of the axle this much better.
 BETTER = 0.8
 # An estimate farther from the prior than this is not believed, by the prior's standard deviations.
-FAR = 3.0
+MOST_DEVIATIONS = 3.0
 
 
 class Axle(NamedTuple):
@@ -91,8 +91,8 @@ class SteeringEstimate:
     def believable(self, prior: "SteeringEstimate") -> bool:
         """Whether it is not far outside a prior; a finger that slipped unseen gives nonsense."""
         sd = np.sqrt(np.diag(prior.covariance)[:2])
-        near = bool(np.hypot(*((self.cof - prior.cof) / sd)) <= FAR)
-        return near and abs(self.rho - prior.rho) <= FAR * prior.rho_sd and self.rho > 0
+        near = bool(np.hypot(*((self.cof - prior.cof) / sd)) <= MOST_DEVIATIONS)
+        return near and abs(self.rho - prior.rho) <= MOST_DEVIATIONS * prior.rho_sd and self.rho > 0
 
     def axle(self, point: ArrayLike) -> Axle:
         """The axle of a contact, with what is known of it."""

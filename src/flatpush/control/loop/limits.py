@@ -77,7 +77,7 @@ class Limits:
         return float(np.max(np.hypot(*self.tips.T)))
 
     def kept(self, last: Command, climb: float, wanted: Command, yaw: float, dt: float) -> Command:
-        """The command nearest to what is wanted, on the way from the last motion, that keeps to every limit.
+        """The command nearest to the wanted one, on the way from the last motion, that keeps to every limit.
 
         A motion is a hand twist and a rate of climbing. What is too fast is slowed down as a whole, so that the object
         turns about the same point; from tick to tick the twist seen from the hand changes by as much as the
@@ -95,8 +95,8 @@ class Limits:
         )
         (ax, ay, aspin), (bx, by, bspin) = last.velocity.tolist(), wanted.velocity.tolist()
         before = HandMotion(ax, ay, aspin, climb)
-        asked = HandMotion(bx, by, bspin, (wanted.height - last.height) / dt)
-        vx, vy, spin, rise = kept_motion(before, asked, yaw, dt, self.tips, most)
+        motion = HandMotion(bx, by, bspin, (wanted.height - last.height) / dt)
+        vx, vy, spin, rise = kept_motion(before, motion, yaw, dt, self.tips, most)
         return Command(np.array([vx, vy, spin]), max(0.0, last.height + rise * dt))
 
     def impossible(self, before: Measurement, frame: Measurement, noise: tuple[float, float]) -> str:
@@ -193,25 +193,25 @@ class HandLimits(NamedTuple):
 
 @formula
 def kept_motion(
-    last: HandMotion, asked: HandMotion, yaw: float, dt: float, tips: Array, limits: HandLimits
+    last: HandMotion, wanted: HandMotion, yaw: float, dt: float, tips: Array, limits: HandLimits
 ) -> HandMotion:
-    """The motion nearest to what is asked, on the way from the last one as seen from the hand, that keeps to limits.
+    """The motion nearest to the wanted one, on the way from the last one as seen from the hand, that keeps to limits.
 
     Args:
         yaw: of the hand at the start of the tick [rad]. tips: of the fingers in E, shape (k, 2).
     """
     fastest = 0.0
     for i in range(tips.shape[0]):
-        for angle in (yaw, yaw + asked.spin * dt):
-            fastest = max(fastest, _speed(tip_motion(asked, tips[i, 0], tips[i, 1], angle)))
+        for angle in (yaw, yaw + wanted.spin * dt):
+            fastest = max(fastest, _speed(tip_motion(wanted, tips[i, 0], tips[i, 1], angle)))
     share = min(
         1.0,
         USED * limits.speed / max(fastest, 1e-300),
-        USED * limits.turn_rate / max(abs(asked.spin), 1e-300),
-        math.sqrt(TURNING * USED * limits.acceleration / max(abs(asked.spin) * fastest, 1e-300)),
+        USED * limits.turn_rate / max(abs(wanted.spin), 1e-300),
+        math.sqrt(TURNING * USED * limits.acceleration / max(abs(wanted.spin) * fastest, 1e-300)),
     )
     share *= ROUNDED if share < 1.0 else 1.0
-    goal = HandMotion(share * asked.vx, share * asked.vy, share * asked.spin, share * asked.climb)
+    goal = HandMotion(share * wanted.vx, share * wanted.vy, share * wanted.spin, share * wanted.climb)
     if _fits(last, goal, yaw, dt, tips, limits):
         return goal
     c, s = math.cos(last.spin * dt), math.sin(last.spin * dt)

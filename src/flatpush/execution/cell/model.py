@@ -26,7 +26,7 @@ AT_FOOT, AT_TIP = 0.004, 0.01
 # Pieces are joined while their union fills its hull to this part.
 CONVEX = 1e-6
 # An outline is drawn within this of its own [m].
-NEAR = 2e-5
+OUTLINE_TOLERANCE = 2e-5
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def convex_pieces(vertices: Array) -> list[Array]:
     """A simple polygon as few convex ones: its triangles, joined while they stay convex; corners (n, 2) of each."""
     import shapely
 
-    whole = shapely.Polygon(vertices).simplify(NEAR)
+    whole = shapely.Polygon(vertices).simplify(OUTLINE_TOLERANCE)
     pieces = list(shapely.constrained_delaunay_triangles(whole).geoms)
     joined = True
     while joined:

@@ -29,7 +29,7 @@ BOTTOM = 1e-13  # an amount below this is nothing [m]
 STIFF = 1e3  # the slope of a cost that starts with a root, in those of full speed
 CLOSED = 1e-12  # how closely the chain has to meet the goal, in turning radii
 OPEN = 0.5  # how far off it may be to be led back, in turning radii
-FAR = 0.7  # the longest step, in turning radii
+LONGEST_STEP = 0.7  # the longest step, in turning radii
 STILL = 1e-9  # a step below this is none, in turning radii
 PAYS = 1e-3  # slope by which an arc at zero must pay to be taken in
 SOFT = 1e-12  # damping of the conditions, which keeps the step solvable where few arcs are left, in turning radii
@@ -381,15 +381,15 @@ def descend(work: Work, cars: Records, pushes: np.ndarray, words: Records, poses
                 cost = _cost(now, n)
             damping, phase = 1e-2, MULTIPLIERS
             continue
-        # As far as the first arc or leg allows, and not further than FAR.
+        # As far as the first arc or leg allows, and not further than LONGEST_STEP.
         _lengths(now, n, legs)
         most, part, hit, hit_leg = 0.0, 1.0, -1, -1
         for k in range(n):
             most = max(most, abs(now[k].step))
             if now[k].step < 0.0 and -now[k].step * part > now[k].y:
                 part, hit = now[k].y / -now[k].step, k
-        if most * part > FAR * radius:
-            part, hit = FAR * radius / most, -1
+        if most * part > LONGEST_STEP * radius:
+            part, hit = LONGEST_STEP * radius / most, -1
         for i in range(len(short)):
             slack, rate = legs[i, 0] - work.least, legs[i, 1]
             if not short[i] and rate < 0.0 and -rate * part > slack:

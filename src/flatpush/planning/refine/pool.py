@@ -30,7 +30,7 @@ def sample_poses(sequences: Sequences, rng: np.random.Generator, count: int, nea
     free = count - local - driven
     parts = [np.column_stack([rng.uniform(low, high, (free, 2)), rng.uniform(-np.pi, np.pi, free)])]
     half = driven // 2
-    for origins, sense, size in ((start[None], 1.0, half), (sequences.ends, -1.0, driven - half)):
+    for origins, sense, size in ((start[None], 1.0, half), (sequences.endpoints, -1.0, driven - half)):
         pushes = rng.integers(fleet.size, size=size)
         poses = origins[np.arange(size) % len(origins)]
         for _ in range(2):
@@ -50,7 +50,7 @@ def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]
     if k < 2 or legs < 2:
         return []
     first = sequences.table(sequences.start[None], poses)[:, 0, :]  # (k, m)
-    every = sequences.table(poses, sequences.ends)  # (k, m, e)
+    every = sequences.table(poses, sequences.endpoints)  # (k, m, e)
     nearest = np.argmin(every, axis=2)  # the end that each push best goes to
     last = np.take_along_axis(every, nearest[..., None], axis=2)[..., 0]
     found: list[Choice] = []
@@ -95,7 +95,7 @@ def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]
             cost,
             np.array(pushes),
             np.concatenate(
-                [[sequences.start], poses[list(via)], sequences.ends[[nearest[pushes[-1], via[-1]]]]]
+                [[sequences.start], poses[list(via)], sequences.endpoints[[nearest[pushes[-1], via[-1]]]]]
             ),
         )
         for cost, pushes, via in chosen
@@ -116,10 +116,10 @@ def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> li
     prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
     pushes = rng.integers(k, size=prefixes)
     starts = compose(sequences.start, exp(_arcs(sequences, rng, pushes)))
-    ends = sequences.ends[
+    ends = sequences.endpoints[
         np.zeros(prefixes, int)
-        if len(sequences.ends) == 1
-        else rng.integers(len(sequences.ends), size=prefixes)
+        if len(sequences.endpoints) == 1
+        else rng.integers(len(sequences.endpoints), size=prefixes)
     ]
     found: list[tuple[float, tuple[int, ...], Array]] = []
     costs, poses = np.empty(k**3), np.empty((k**3, 2, 3))
@@ -131,7 +131,7 @@ def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> li
             if prefix < 0
             else sequences.candidate(pushes[[prefix]], np.array([sequences.start, start])).cost
         )
-        end = sequences.ends[0] if prefix < 0 else ends[prefix]
+        end = sequences.endpoints[0] if prefix < 0 else ends[prefix]
         three_arcs(sequences.cars, switching, start, end, costs, poses)
         for triple in np.argsort(costs)[: ARC_SEEDS if prefix < 0 else 4]:
             i, j, h = triple // (k * k), triple // k % k, triple % k

@@ -43,7 +43,7 @@ class Sequences:
 
     Attributes:
         fleet, start, goal, free: of the query.
-        ends: where plans may end, shape (e, 3): the goal alone, or with several angles where any will do.
+        endpoints: where plans may end, shape (e, 3): the goal alone, or with several angles where any will do.
         least: that the flat path of each leg of a plan with several pushes is long [m].
         cars: the fleet as records; changes: its switching costs; flat: whether all are Dubins cars.
         offsets: displacements of the switch poses for the cost of replanning, shape (16, 3).
@@ -53,7 +53,7 @@ class Sequences:
     start: Array
     goal: Array
     free: bool
-    ends: Array
+    endpoints: Array
     least: float
     cars: Records
     changes: list[list[float]]
@@ -67,7 +67,7 @@ class Sequences:
             raise InputError("the least length of a leg is 0 or more", value=least)
         fleet = query.fleet
         return cls(
-            fleet, query.start, query.goal, query.free, _ends(query), float(least), fleet.cars,
+            fleet, query.start, query.goal, query.free, _endpoints(query), float(least), fleet.cars,
             fleet.switching.tolist(), offsets(), fleet.is_dubins,
         )  # fmt: skip
 
@@ -98,12 +98,12 @@ class Sequences:
 
     def direct(self) -> Candidate:
         """The best single push."""
-        ends = self.ends[: self.fleet.size if self.free else 1]
+        endpoints = self.endpoints[: self.fleet.size if self.free else 1]
         return min(
             (
                 self.candidate(np.array([k]), np.array([self.start, end]))
                 for k in range(self.fleet.size)
-                for end in ends
+                for end in endpoints
             ),
             key=lambda found: found.cost,
         )
@@ -135,8 +135,8 @@ class Sequences:
         total = self.chain(pushes[:1], poses[:2])[0] + self.switching(pushes)
         for i in range(1, len(pushes)):
             for offset in self.offsets:
-                ends = np.array([poses[i] + offset, poses[i + 1]])
-                total += self.chain(pushes[i : i + 1], ends)[0] / len(self.offsets)
+                endpoints = np.array([poses[i] + offset, poses[i + 1]])
+                total += self.chain(pushes[i : i + 1], endpoints)[0] / len(self.offsets)
         return total
 
     def settle(self, found: Candidate) -> Candidate:
@@ -171,7 +171,7 @@ class Sequences:
         )
 
 
-def _ends(query: Query) -> Array:
+def _endpoints(query: Query) -> Array:
     """The goal; or, where any angle will do, with the best one of every single push first, and then all around."""
     if not query.free:
         return query.goal[None]

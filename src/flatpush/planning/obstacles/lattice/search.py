@@ -50,19 +50,19 @@ class Reach:
         from .kernels import distances
 
         self.point, self.radius = largest_disc(query)
-        ends = np.array([transform(X, self.point) for X in (query.start, query.goal)])
+        endpoints = np.array([transform(X, self.point) for X in (query.start, query.goal)])
         box = query.extent
         size = np.array([box.xmax - box.xmin, box.ymax - box.ymin])
         cell = max(0.35 * self.radius, float(np.sqrt(np.prod(size) / GRID_CELLS)))
         self.nx, self.ny = (int(n) + 1 for n in size / cell)
         self.cell, self.corner = cell, np.array(box[:2])
         self.far = distances(
-            query.world.arrays, self.radius, box, cell, self.nx, self.ny, ends[1], query.clearance
+            query.world.arrays, self.radius, box, cell, self.nx, self.ny, endpoints[1], query.clearance
         )
-        at = np.clip(((ends[0] - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
+        at = np.clip(((endpoints[0] - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
         way = float(self.far[at[1] * self.nx + at[0]])
         self.open = bool(np.isfinite(way))
-        self.direct = way <= DETOUR * float(np.hypot(*(ends[1] - ends[0]))) + 2 * cell
+        self.direct = way <= DETOUR * float(np.hypot(*(endpoints[1] - endpoints[0]))) + 2 * cell
         rates = []
         for a in range(query.fleet.size):
             laws = np.where(np.isfinite(query.fleet.speeds[a]), query.fleet.speeds[a], 1.0)

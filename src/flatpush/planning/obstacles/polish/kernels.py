@@ -12,7 +12,7 @@ from ...query_arrays import QueryArrays
 from ..kernels import changes, connect, put, random, replanned
 
 MOST = 256
-FAR = 48  # legs of a path that one word may replace at first
+LONGEST_SHORTCUT = 48  # legs of a path that one word may replace at first
 TRIES = 3  # words of a push that are looked at for one that keeps clear
 SMALL, LARGE = 3e-5, 0.2  # shifts, in turning radii and radians
 GAIN = 1e-9  # of the cost, that a move must save
@@ -270,7 +270,7 @@ def thread(T: QueryArrays, knots: Array, arrived: np.ndarray, given: Records, n:
             best[j, a], before[j, a], by[j, a] = np.inf, -1, -1
     buffer, here = np.empty(MOST_WORDS, WORD), np.empty(3)
     for j in range(1, n + 1):
-        for i in range(max(0, j - FAR), j):
+        for i in range(max(0, j - LONGEST_SHORTCUT), j):
             for a in range(k):
                 used = False
                 for q in range(i, j):

@@ -12,7 +12,7 @@ from ....steering.six_words import MOST_WORDS, STRAIGHT, TURN, WORD, Records, al
 from ...query_arrays import QueryArrays
 from ..kernels import changes, free, keeps, put, random
 
-NEAR = 2  # nodes of a tree that are tried
+NEIGHBOURS = 2  # nodes of a tree that are tried
 TRIES = 2  # words of each
 CUT = 0.7, 3.0  # way of an edge that is cut short, in turning radii, from … to …
 
@@ -69,7 +69,7 @@ def grow(
     """
     poses, sizes = forest.poses, forest.sizes
     k = len(T.cars)
-    pose, here, near = np.empty(3), np.empty(3), np.empty(NEAR, np.int64)
+    pose, here, near = np.empty(3), np.empty(3), np.empty(NEIGHBOURS, np.int64)
     buffer, word = np.empty(MOST_WORDS, WORD), np.empty(1, WORD)
     left = budget
     side = 0
@@ -127,19 +127,19 @@ def _added(forest: Forest, side: int, pose: Array, a: int, parent: int, word: An
 def _nearest(poses: Array, size: int, pose: Array, radius: float, near: np.ndarray) -> int:
     """The nearest nodes, nearest first, by place and, with the turning radius, heading; returns how many."""
     count = 0
-    keys = np.empty(NEAR)
+    keys = np.empty(NEIGHBOURS)
     for i in range(size):
         dx, dy = poses[i, 0] - pose[0], poses[i, 1] - pose[1]
         turn = abs((poses[i, 2] - pose[2] + math.pi) % TURN - math.pi)
         key = math.sqrt(dx * dx + dy * dy) + radius * turn
-        if count == NEAR and key >= keys[NEAR - 1]:
+        if count == NEIGHBOURS and key >= keys[NEIGHBOURS - 1]:
             continue
-        at = count if count < NEAR else NEAR - 1
+        at = count if count < NEIGHBOURS else NEIGHBOURS - 1
         while at > 0 and keys[at - 1] > key:
             keys[at], near[at] = keys[at - 1], near[at - 1]
             at -= 1
         keys[at], near[at] = key, i
-        count = min(count + 1, NEAR)
+        count = min(count + 1, NEIGHBOURS)
     return count
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from flatpush.contact import PointContact
 from flatpush.friction import Ellipsoid, Exact, Support
-from flatpush.planning.freedom import freedom
+from flatpush.planning.controllability import controllability
 from flatpush.steering.car import Car
 
 SQUARE = Exact(Support.polygon([(0.02, -0.02), (0.02, 0.02), (-0.02, 0.02), (-0.02, -0.02)]))
@@ -20,16 +20,16 @@ def car(angle: float, surface=SQUARE) -> Car:
 @pytest.mark.parametrize("surface", [SQUARE, A])
 def test_one_push_reaches_all_by_detours_and_two_opposite_ones_are_free(surface):
     """Two opposite pushes with friction are enough (methods 1.13)."""
-    assert freedom([]) == "none"
-    assert freedom([car(0.0, surface)]) == "detours"
-    assert freedom([car(0.0, surface), car(np.pi, surface)]) == "free"
-    assert freedom([car(0.0, surface), car(np.pi / 2, surface)]) == "detours"
+    assert controllability([]) == "none"
+    assert controllability([car(0.0, surface)]) == "detours"
+    assert controllability([car(0.0, surface), car(np.pi, surface)]) == "free"
+    assert controllability([car(0.0, surface), car(np.pi / 2, surface)]) == "detours"
 
 
 def test_three_directions_that_span_the_plane_are_free():
     """[Lynch1996] Thm. 7."""
-    assert freedom([car(a) for a in (0.0, 2 * np.pi / 3, -2 * np.pi / 3)]) == "free"
-    assert freedom([car(a) for a in (0.0, 0.5, -0.5)]) == "detours"
+    assert controllability([car(a) for a in (0.0, 2 * np.pi / 3, -2 * np.pi / 3)]) == "free"
+    assert controllability([car(a) for a in (0.0, 0.5, -0.5)]) == "detours"
 
 
 def test_a_detour_is_a_detour():

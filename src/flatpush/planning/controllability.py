@@ -10,7 +10,7 @@ from ..geometry import shift_twist
 from ..geometry.pose import Array
 from ..steering.car import Car
 
-Freedom = Literal["free", "detours", "none"]
+Controllability = Literal["free", "detours", "none"]
 
 WORDS = {
     "free": "these pushes move the object freely: any small displacement is reached by small motions",
@@ -19,7 +19,7 @@ WORDS = {
 }
 
 
-def freedom(cars: Sequence[Car]) -> Freedom:
+def controllability(cars: Sequence[Car]) -> Controllability:
     """What the cars of an object can do together.
 
     "free" is small-time local controllability: the twists positively span a great circle of the velocity sphere that
