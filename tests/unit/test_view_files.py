@@ -30,6 +30,7 @@ from flatpush.view import check_figure, save_figure
 from flatpush.view.drawing import Drawing, Text, font, text_width
 from flatpush.view.letters import UNITS, WIDTHS
 from flatpush.view.page import draw_page
+from flatpush.view.picture import encoded
 from flatpush.view.raster import PIXELS
 from flatpush.view.timeline import Timeline
 
@@ -84,7 +85,7 @@ def test_the_box_of_a_text_is_what_its_letters_cover():
         page = Drawing(300, 300, "")
         text = Text(150.0, 150.0, "Egypt 180", 20.0, anchor="middle", upright=upright)
         page.add(text)
-        picture = np.asarray(Image.open(io.BytesIO(page.encode(".png"))).convert("L"))
+        picture = np.asarray(Image.open(io.BytesIO(encoded(page, ".png"))).convert("L"))
         y, x = (span / PIXELS for span in np.nonzero(picture < 128))
         left, top, right, bottom = text.box
         ends = (x.min(), x.max(), y.min(), y.max())

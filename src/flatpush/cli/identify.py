@@ -64,9 +64,9 @@ def command(
         raise InputError("--length is positive and finite", value=length)
     check_outputs([*data, *(() if scene is None else scene_files(scene))], [output, figure])
     if figure is not None:
-        from ..view.figure import check_ending
+        from ..view.picture import check_ending
 
-        check_ending(figure, (".svg", ".png"))
+        check_ending(figure)
     experiments, notes = _read(data, units, skip_bad, pool)
     if len(experiments) > 1 and output is not None:
         raise InputError(
@@ -128,7 +128,7 @@ class _Found:
         self.surface = self.fits[self.model]
 
     def document(self) -> dict[str, Any]:
-        from ..documents.mechanics import surface_form
+        from ..documents.surface_file import surface_form
         from ..view.angle_table import angle_numbers
 
         models: dict[str, Any] = {name: angle_numbers([j]) for name, j in self.judged.items()}

@@ -65,9 +65,9 @@ def command(
     if log is not None:
         check_log(log)
     if figure is not None:
-        from ..view.figure import check_ending
+        from ..view.picture import check_ending
 
-        check_ending(figure, (".svg", ".png"))
+        check_ending(figure)
     loaded = load_plan(plan)
     failed = (
         verify(loaded, None if scene is None else load_scene(scene)).failed

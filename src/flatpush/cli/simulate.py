@@ -63,9 +63,11 @@ def command(
     check_outputs([plan], [output, figure])
     warn_unverified(loaded)
     if figure is not None:
-        from ..view.figure import ENDINGS, check_ending
+        from ..view.figure import ENDINGS
+        from ..view.picture import ENDINGS as PICTURES
+        from ..view.picture import check_ending
 
-        check_ending(figure, ENDINGS if runs == 1 else (".svg", ".png"))
+        check_ending(figure, ENDINGS if runs == 1 else PICTURES)
     if runs == 1:
         return _one(loaded, model, source, output, figure, as_json)
     return _many(loaded, runs, seed, noise, model, source, output, figure, on_cluster, scheduler, as_json)

@@ -85,10 +85,10 @@ def command(
     loaded = load_plan(plan)
     warn_unverified(loaded)
     if figure is not None:
-        from ..view.figure import check_ending
+        from ..view.picture import check_ending
 
         check_outputs([plan], [figure])
-        check_ending(figure, (".svg", ".png"))
+        check_ending(figure)
     run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")

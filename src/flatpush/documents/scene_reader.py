@@ -126,7 +126,8 @@ def _scene(ctx: Context, model: m.SceneModel) -> Scene:
 
 
 def _object(ctx: Context, part: m.ObjectPart) -> Object:
-    from .mechanics import read_support, read_surface
+    from .support_form import read_support
+    from .surface_file import read_surface
 
     with ctx.at("object.outline"):
         outline = _outline(ctx, part.outline)

@@ -7,8 +7,9 @@ from typing import Any
 from ..errors import InputError
 from ..geometry import Outline
 from ..problem import Scene
-from .mechanics import support_form, surface_form
 from .reading import join
+from .support_form import support_form
+from .surface_file import surface_form
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:

@@ -1,19 +1,19 @@
-"""Reads and writes a surface document: a limit surface about the centre of friction, in SI."""
+"""Reads and writes limit surfaces about the centre of friction: in a scene, and as a document of their own, in SI."""
 
 import json
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
 from ..friction.surface import LimitSurface
 from .atomic import write_atomically
-from .mechanics import read_surface, surface_form
 from .reading import read_mapping
 from .refusals import checked
-from .scene_model import Coefficients, EllipsoidPart, Matrix, Part, QuarticPart
+from .scene_model import Coefficients, EllipsoidPart, Matrix, Part, QuarticPart, SurfaceFilePart
 
 
 def save_surface(surface: LimitSurface, path: str | os.PathLike[str]) -> None:
@@ -45,6 +45,33 @@ def load_surface(path: str | os.PathLike[str]) -> LimitSurface:
         raise InputError(
             error.rule, source=source, key=given[0], value=document[given[0]], hint=error.hint
         ) from None
+
+
+def read_surface(form: Any, folder: Path) -> LimitSurface:
+    """The limit surface of a parsed form."""
+    if isinstance(form, SurfaceFilePart):
+        return load_surface(folder / form.file)
+    if isinstance(form, EllipsoidPart):
+        from ..friction.ellipsoid import Ellipsoid
+
+        return Ellipsoid(np.array(form.ellipsoid))
+    from ..friction.quartic import Quartic
+
+    return Quartic(np.array(form.quartic))
+
+
+def surface_form(surface: LimitSurface) -> dict[str, Any]:
+    """What a document says of a limit surface, in SI."""
+    for name, attribute in (("ellipsoid", "matrix"), ("quartic", "coefficients")):
+        values = getattr(surface, attribute, None)
+        if values is not None:
+            return {name: np.asarray(values, dtype=float).tolist()}
+    raise InputError(
+        "a document holds an ellipsoid or a quartic as limit surface",
+        key="object.surface",
+        value=type(surface).__name__,
+        hint="Give an exact surface by its support.",
+    )
 
 
 class _Surface(Part):

@@ -186,9 +186,9 @@ def run(folder: Path | None = None) -> str:
 
 def draw(path: Path) -> None:
     """Reference and actual path of the flat point, and the errors over time, for both gains under the perturbed A."""
-    from ..documents.atomic import write_atomically
     from ..view import drawing, legend, palette
     from ..view.panel import BOTTOM, LEFT, Panel
+    from ..view.picture import save_picture
 
     model = push_model()
     ref = reference(model)
@@ -229,4 +229,4 @@ def draw(path: Path) -> None:
         table.line(paths[name], look)
         if name in distances:
             errors.line(distances[name], look)
-    write_atomically(path, page.encode(path.suffix))
+    save_picture(page, path)

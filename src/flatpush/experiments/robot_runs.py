@@ -165,14 +165,13 @@ def half_widths(values: Array) -> Array:
 
 def draw(figure: str, found: list[Case], path: Path) -> None:
     """Initial poses in the colours of the paper and final ones in black."""
-    from ..documents import write_atomically
     from ..view.drawing import INK, PAGE, Drawing, Look
-    from ..view.figure import check_ending
     from ..view.legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
     from ..view.panel import BOTTOM, LEFT, Panel
+    from ..view.picture import check_ending, save_picture
     from ..view.table import MM, draw_object, outline_at
 
-    ending = check_ending(path, (".svg", ".png"))
+    check_ending(path)
     scene = found[0].plans[0].scene
     title = f"{scene.object.name}: {sum(len(case.ends) for case in found)} open-loop runs of two fingers ({figure})"
     corners = np.concatenate(
@@ -199,4 +198,4 @@ def draw(figure: str, found: list[Case], path: Path) -> None:
             draw_object(panel, scene, begin, Look(colour, 0.8), 4)
             draw_object(panel, scene, end, Look(INK, 0.6), 5)
     draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
-    write_atomically(path, page.encode(ending))
+    save_picture(page, path)

@@ -4,19 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..friction.cross_validation import Judgement, interval
 from ..geometry.pose import Array
 from . import drawing as d
 from . import palette
 from .angle_table import Judged
 from .drawing import MARKS, PAGE, SOFT, Drawing, Look
-from .figure import check_ending
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM
+from .picture import check_ending, save_picture
 from .rows import names_width, row_axes
 
-ENDINGS = (".svg", ".png")
 ROW = 38.0  # height of a row [pt]
 COLOURS = (
     palette.PUSHES[1],
@@ -34,8 +32,8 @@ def angle_figure(judged: Judged, path: str | Path, *, title: str, subtitle: str 
     Raises:
         InputError: if the ending is another, or the file cannot be written.
     """
-    ending = check_ending(path, ENDINGS)
-    write_atomically(path, draw_angles(judged, title, subtitle).encode(ending))
+    check_ending(path)
+    save_picture(draw_angles(judged, title, subtitle), path)
 
 
 def draw_angles(judged: Judged, title: str, subtitle: str = "") -> Drawing:

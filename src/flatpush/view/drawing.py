@@ -119,16 +119,6 @@ class Drawing:
         """The texts, from the back to the front."""
         return [item for _, item in self.items() if isinstance(item, Text)]
 
-    def encode(self, ending: str) -> bytes:
-        """The picture as ".svg" or ".png"."""
-        if ending == ".svg":
-            from .svg import svg_text
-
-            return svg_text(self).encode("utf-8")
-        from .raster import png_bytes
-
-        return png_bytes(self)
-
 
 MARKS = "osD^vP"  # kinds of marks, as they are tried in turn: disc, square, diamond, triangles, cross
 

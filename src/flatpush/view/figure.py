@@ -7,6 +7,7 @@ from ..documents.atomic import write_atomically
 from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Plan, Rollout
+from .picture import check_ending, encoded
 
 ENDINGS = (".svg", ".png", ".gif", ".html")
 
@@ -38,7 +39,7 @@ def save_figure(
     else:
         from .plan_figure import draw_plan
 
-        content = draw_plan(plan, rollouts, explored).encode(ending)
+        content = encoded(draw_plan(plan, rollouts, explored), ending)
     write_atomically(path, content)
 
 
@@ -59,15 +60,3 @@ def check_figure_at(path: str | Path, endings: tuple[str, ...]) -> None:
         raise InputError("this is a folder, not a file", source=str(path))
     if not target.parent.is_dir():
         raise InputError("the folder of this file does not exist", source=str(path), hint="Create it first.")
-
-
-def check_ending(path: str | Path, endings: tuple[str, ...]) -> str:
-    """The ending of a file name in lower case, if it is one of these."""
-    ending = Path(path).suffix.lower()
-    if ending not in endings:
-        raise InputError(
-            f"the name of a figure ends in {', '.join(endings[:-1])} or {endings[-1]}",
-            source=str(path),
-            value=ending or "no ending",
-        )
-    return ending

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..documents.outline_reader import OutlineNote
 from ..documents.shapes import DrawnOutline
 from ..errors import InputError
@@ -15,10 +14,10 @@ from ..problem import Scene
 from . import drawing as d
 from . import palette, words
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
-from .figure import check_ending
 from .labels import Labels, dense
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
+from .picture import check_ending, save_picture
 from .plan_figure import cone_length
 from .push_sketch import PushSketch
 from .table import MM, tip_size
@@ -48,10 +47,10 @@ def describe_figure(
     Raises:
         InputError: if the ending is another, the file cannot be written, or there is nothing to draw.
     """
-    ending = check_ending(path, (".svg", ".png"))
+    check_ending(path)
     if not descriptions:
         raise InputError("there is at least one push to describe", source=str(path))
-    write_atomically(path, draw_sketches(scene, descriptions, note).encode(ending))
+    save_picture(draw_sketches(scene, descriptions, note), path)
 
 
 def draw_sketches(scene: Scene, sketches: Sequence[PushSketch], note: OutlineNote | None = None) -> Drawing:

@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..geometry.pose import Array
 from . import drawing as d
 from . import palette
 from .drawing import INK, MARKS, PAGE, Drawing, Look
-from .figure import check_ending
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM
+from .picture import check_ending, save_picture
 from .rows import names_width, row_axes
 
-ENDINGS = (".svg", ".png")
 ROW = 36.0  # height of a row [pt]
 COLUMNS = (
     ("distance at the end [mm]", 1000.0),
@@ -52,8 +50,8 @@ def replay_figure(
     Raises:
         InputError: if the ending is another, or the file cannot be written.
     """
-    ending = check_ending(path, ENDINGS)
-    write_atomically(path, draw_replay(rows, looks, title, subtitle).encode(ending))
+    check_ending(path)
+    save_picture(draw_replay(rows, looks, title, subtitle), path)
 
 
 def draw_replay(rows: Sequence[ReplayRow], looks: Sequence[str], title: str, subtitle: str = "") -> Drawing:

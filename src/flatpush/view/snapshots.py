@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..errors import InputError
 from ..geometry import transform
 from ..geometry.pose import Array
@@ -15,11 +14,11 @@ from .drawing import PAGE, SOFT, Drawing, Look
 from .figure import check_figure_at
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
+from .picture import ENDINGS, save_picture
 from .table import MM, draw_fingers, draw_object, draw_workspace, view_box, workspace_entries
 from .timeline import Timeline, doing
 from .trace import fingers_at, fingertips, trace_pushes
 
-ENDINGS = (".svg", ".png")
 COLUMNS = 4
 ABOVE = 24.0  # room for the words above a panel [pt]
 
@@ -39,7 +38,7 @@ def save_snapshots(plan: Plan, path: str | Path, count: int = 8) -> None:
     if count < 2:
         raise InputError("snapshots show at least the start and the end", value=count)
     check_snapshots(path)
-    write_atomically(path, draw_snapshots(plan, count).encode(Path(path).suffix.lower()))
+    save_picture(draw_snapshots(plan, count), path)
 
 
 def check_snapshots(path: str | Path) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..friction.pairs import Pairs
 from ..friction.report import twist_angles
 from ..friction.surface import LimitSurface
@@ -13,11 +12,10 @@ from ..geometry.pose import Array
 from . import drawing as d
 from . import palette
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
-from .figure import check_ending
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel, number, ticks
+from .picture import check_ending, save_picture
 
-ENDINGS = (".svg", ".png")
 COLOURS = {"ellipsoid": palette.PUSHES[1], "quartic": palette.GOAL, "loads": palette.PUSHES[0]}
 # Of angles from 0 to WORST: after the map viridis of S. van der Walt and N. Smith, from light to dark.
 SHADES = ("#fde725", "#90d743", "#35b779", "#21918c", "#31688e", "#443983", "#440154")
@@ -59,9 +57,9 @@ def surface_figure(
     Raises:
         InputError: if the ending is another, or the file cannot be written.
     """
-    ending = check_ending(path, ENDINGS)
+    check_ending(path)
     drawn = draw_surfaces(surfaces, pairs, length, title or "limit surfaces from data", subtitle)
-    write_atomically(path, drawn.encode(ending))
+    save_picture(drawn, path)
 
 
 def draw_surfaces(

@@ -7,21 +7,19 @@ from pathlib import Path
 import numpy as np
 
 from ..control.loop.closed_loop import ClosedLoopRun
-from ..documents.atomic import write_atomically
 from ..geometry import transform
 from ..geometry.pose import Array
 from ..problem import Plan, Scene
 from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Box, Drawing, Look
-from .figure import check_ending
 from .labels import Labels
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import AXIS, BOTTOM, LEFT, Panel, number, ticks
+from .picture import check_ending, save_picture
 from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn, workspace_entries
 from .trace import trace_pushes
 
-ENDINGS = (".svg", ".png")
 STRIP = 11.0  # height of a strip over time [pt]
 LEAST_SEEN = 1 / 800  # part of the time that is a quarter of a point in a strip
 MOST_SAMPLES = 400  # of the clearance
@@ -49,8 +47,8 @@ def track_figure(plan: Plan, run: ClosedLoopRun, path: str | Path, subtitle: str
     Raises:
         InputError: if the ending is another, or the file cannot be written.
     """
-    ending = check_ending(path, ENDINGS)
-    write_atomically(path, draw_track(plan, run, subtitle).encode(ending))
+    check_ending(path)
+    save_picture(draw_track(plan, run, subtitle), path)
 
 
 def draw_track(plan: Plan, run: ClosedLoopRun, subtitle: str = "") -> Drawing:

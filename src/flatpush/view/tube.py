@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..documents.atomic import write_atomically
 from ..errors import InputError
 from ..geometry import transform
 from ..geometry.pose import Array
@@ -12,10 +11,10 @@ from ..simulation.study import Runs
 from . import drawing as d
 from . import palette
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
-from .figure import check_ending
 from .labels import Labels
 from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
+from .picture import check_ending, save_picture
 from .table import (
     MM,
     draw_endpoints,
@@ -28,7 +27,6 @@ from .table import (
 )
 from .trace import trace_pushes
 
-ENDINGS = (".svg", ".png")
 MOST_DRAWN = 200
 BANDS = ((0.025, 0.975, 0.22), (0.25, 0.75, 0.42))  # quantiles and opacity
 FEWEST = 5  # runs under way at a sample, for a band there
@@ -54,10 +52,10 @@ def tube_figure(runs: Runs, path: str | Path) -> None:
     Raises:
         InputError: if nothing was recorded, the ending is another, or the file cannot be written.
     """
-    ending = check_ending(path, ENDINGS)
+    check_ending(path)
     if runs.object is None:
         raise InputError("the tube needs runs that were recorded", hint="study(…, record=True)")
-    write_atomically(path, draw_tube(runs).encode(ending))
+    save_picture(draw_tube(runs), path)
 
 
 def draw_tube(runs: Runs) -> Drawing:

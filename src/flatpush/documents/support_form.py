@@ -1,7 +1,5 @@
-"""Reads and writes what a document says of an object's friction with the table: its support and its limit
-surface."""
+"""Reads and writes what a document says of an object's support."""
 
-from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -10,7 +8,6 @@ import numpy as np
 from ..errors import InputError
 from ..friction.pressure import Edges, Feet, Round
 from ..friction.support import Support
-from ..friction.surface import LimitSurface
 from ..geometry import Outline
 from ..problem import Object
 from . import scene_model as m
@@ -64,32 +61,3 @@ def support_form(obj: Object) -> str | dict[str, Any]:
             return "uniform" if pressure.filled else "outline"
         return {"polygon" if pressure.filled else "outline": corners.tolist()}
     raise InputError("a scene document cannot hold this support", key="object.support", value=support)
-
-
-def read_surface(form: Any, folder: Path) -> LimitSurface:
-    """The limit surface of a parsed form."""
-    if isinstance(form, m.SurfaceFilePart):
-        from .surface_file import load_surface
-
-        return load_surface(folder / form.file)
-    if isinstance(form, m.EllipsoidPart):
-        from ..friction.ellipsoid import Ellipsoid
-
-        return Ellipsoid(np.array(form.ellipsoid))
-    from ..friction.quartic import Quartic
-
-    return Quartic(np.array(form.quartic))
-
-
-def surface_form(surface: LimitSurface) -> dict[str, Any]:
-    """What a document says of a limit surface, in SI."""
-    for name, attribute in (("ellipsoid", "matrix"), ("quartic", "coefficients")):
-        values = getattr(surface, attribute, None)
-        if values is not None:
-            return {name: np.asarray(values, dtype=float).tolist()}
-    raise InputError(
-        "a document holds an ellipsoid or a quartic as limit surface",
-        key="object.surface",
-        value=type(surface).__name__,
-        hint="Give an exact surface by its support.",
-    )
