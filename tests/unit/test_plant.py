@@ -7,12 +7,12 @@ import flatpush as fp
 from flatpush.contact import PointContact
 from flatpush.errors import InputError
 from flatpush.friction import Exact, LimitSurface
-from flatpush.simulation.plant import MODES, Plant, steps
+from flatpush.simulation.plant import MODES, Plant, facing, steps
 from flatpush.simulation.plant import runner as module
 from flatpush.simulation.plant.arrays import interpreted, outline_arrays, surface_arrays
 from flatpush.simulation.plant.contact_modes import one
+from flatpush.simulation.plant.facing import nearest
 from flatpush.simulation.plant.resistance import stick_of, twist_of, wrench_of
-from flatpush.simulation.plant.steps import nearest
 
 TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
 HOOK = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.04), (0.04, 0.04), (0.04, 0.02), (0.0, 0.02)]
@@ -147,7 +147,7 @@ def test_a_start_inside_is_an_outcome_or_is_pushed_out(square):
 
 def test_what_overlaps_a_little_more_than_it_may_is_pushed_out(square):
     """Deeper than a start may be, and no deeper than twice that."""
-    deep = 1.5 * steps.OVERLAP * square.outline.size
+    deep = 1.5 * facing.OVERLAP * square.outline.size
     plant = Plant(square, [[0.0, 0.0]], 0.1)
     hand = [-1.1 + deep, 0.2, 0.0]
     assert plant.start([0, 0, 0], hand, push_out=False).outcome == "starts inside"
@@ -251,8 +251,8 @@ def test_a_finger_in_a_hollow_is_not_watched_step_by_step(monkeypatch):
     ]  # fmt: skip
     thing = fp.Object(np.array(corners) / 1000, fp.Support.points(feet, [0.131, 0.311, 0.558]), 0.33)
     taken = []
-    real = steps._settle
-    monkeypatch.setattr(steps, "_settle", lambda *args: (taken.append(args[2]), real(*args)))
+    real = steps.close_gaps
+    monkeypatch.setattr(steps, "close_gaps", lambda *args: (taken.append(args[2]), real(*args)))
     patient(monkeypatch, 1e9)
     way = np.array([[-24.35, -7.81, 0.0], [46.13, 63.13, 0.0]]) / 1000
     run = Plant(thing, [[0.0, 0.0]], 0.0025).follow([0, 0, 0], way)

@@ -11,12 +11,13 @@ from ..errors import InputError
 from ..geometry.pose import Array
 from .least import least_dissipation
 from .pressure import ON_FOOT, Feet, Pressure
+from .root_step import root_step
 from .support import ON_LINE, Support
 from .surface import LimitSurface, WrenchSet
 
 # A force that misses a facet by less than this part of the load lies on it: a twist beside the rim would
 # turn about a point so near the foot that its own rounding decides the direction of the foot's force.
-_TIE = 1e-10
+TIE = 1e-10
 _MAX_STEPS = 200
 
 
@@ -160,7 +161,7 @@ class Exact(LimitSurface):
             power = turns @ F
             with np.errstate(divide="ignore", invalid="ignore"):
                 g = (h / power)[:, None] * F[:2] - wrenches[:, :2]
-                on = np.flatnonzero((power != 0) & (np.hypot(g[:, 0], g[:, 1]) <= weights + _TIE))
+                on = np.flatnonzero((power != 0) & (np.hypot(g[:, 0], g[:, 1]) <= weights + TIE))
             if len(on):
                 V = turns[on[0]]
                 return V * (np.sign(power[on[0]]) / np.sqrt(V @ V))
@@ -184,20 +185,11 @@ class Exact(LimitSurface):
             if abs(slope) <= 4e-16 * arm:
                 break
             low, high = (w, high) if slope < 0 else (low, w)
-            reach = 4 * (abs(w) + 1 / arm)
-            step = -slope / bend if bend > 0 else -np.sign(slope) * reach
-            step = float(np.clip(step, -reach, reach))
-            bracketed = np.isfinite(low) and np.isfinite(high)
-            if bracketed and (not low < w + step < high or abs(slope) > before / 2):
-                step = (low + high) / 2 - w
-            elif abs(slope) <= 1e-8 * arm and abs(step) <= 1e-8 * (abs(w) + 1 / arm):
-                # Newton has converged: the error of this step is of second order.
-                w += step
+            step, done = root_step(w, slope, bend, low, high, before, arm)
+            w += step
+            if done:
                 break
             before = abs(slope)
-            if w + step == w or (bracketed and high - low <= 1e-16 * (abs(w) + 1 / arm)):
-                break
-            w += step
         return V0 + w * k
 
     def _rests(self, p: Array, u: Array, k: Array) -> Array | None:
@@ -208,7 +200,7 @@ class Exact(LimitSurface):
         near = np.flatnonzero((np.abs(arms @ u) <= ON_FOOT * self._unit.radius) & (lengths > ON_LINE))
         for j in near:
             w = float(arms[j, 0] * u[1] - arms[j, 1] * u[0]) / lengths[j] ** 2
-            if abs(k @ wrenches[j]) <= weights[j] * lengths[j] + _TIE:
+            if abs(k @ wrenches[j]) <= weights[j] * lengths[j] + TIE:
                 return w * turns[j]
         return None
 

@@ -18,7 +18,7 @@ from ..geometry.pose import Array
 ON_FOOT = 1e-9
 # Beyond this many radii the integrand is smooth: the cubature (degree 9) is exact to 1e-13 there, whereas the
 # torque U + c·G of the closed forms loses digits to cancellation.
-FAR = 16.0
+POINT_LIKE = 16.0
 _DEGREE = 9
 _TINY = 1e-30
 
@@ -53,7 +53,7 @@ class Pressure(ABC):
     def resist(self, twist: Array) -> tuple[Array, Array, Array]:
         """h (m,), ∇h (m, 3) and ∇²h (m, 3, 3) of the twists (m, 3), none of them zero: h(V) = ∫ |v| dN."""
         V = twist
-        far = V[:, 0] ** 2 + V[:, 1] ** 2 >= (FAR * self.radius * V[:, 2]) ** 2
+        far = V[:, 0] ** 2 + V[:, 1] ** 2 >= (POINT_LIKE * self.radius * V[:, 2]) ** 2
         if far.all():
             return _by_nodes(*self.nodes, 0.0, V)
         if not far.any():

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formulas import formula
+from ...geometry.displacement import displaced
 from ...geometry.pose import Array
 from ..loop.limits import HandLimits, HandMotion, kept_motion
 from .formulas import (
@@ -218,12 +219,7 @@ def rollout(
         if abs(along) > loop.half:
             outcome = 1
             break
-        turn = w * dt
-        sine, versine = (
-            (math.sin(turn) / turn, (1 - math.cos(turn)) / turn) if abs(turn) > 1e-6 else (1.0, 0.5 * turn)
-        )
-        ex, ey = dt * (sine * a - versine * b), dt * (versine * a + sine * b)
-        qx, qy, qt = qx + c * ex - d * ey, qy + d * ex + c * ey, qt + turn
+        qx, qy, qt = displaced(qx, qy, qt, a, b, w, dt)
     for k in range(way.shape[0]):
         if k == way.shape[0] - 1 or (outcome != 0 and np.isnan(way[k, 0])):
             way[k, 0], way[k, 1], way[k, 2] = qx, qy, qt

@@ -19,7 +19,8 @@ from .arrays import (
     Setting,
     SidesArrays,
 )
-from .steps import follow, push_out
+from .contacts import push_out
+from .steps import follow
 
 
 @formula

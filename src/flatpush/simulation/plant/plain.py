@@ -13,13 +13,15 @@ from ...contact.several import several_motion
 from ...friction.surface import LimitSurface
 from ...geometry import Outline, compose, exp, inverse, perpendicular, rotate, shift_twist, transform
 from ...geometry.pose import Array
-from .steps import CORNER_STEP, HALVINGS, LEVER, LOOKS, OVERLAP, SETTLES, SHARP_STEP, STEP, TOUCH
+from .contacts import LEVER, TOUCH
+from .facing import OVERLAP
+from .steps import CORNER_STEP, HALVINGS, LOOKS, SETTLES, SHARP_STEP, STEP
 
 Held = set[tuple[int, int]]  # fingers that touch, with the number of the place
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class NearContact:
     """A place where a fingertip is near the outline: gap [m], point and inward normal in O, finger, feature, slot."""
 
     gap: float
@@ -41,15 +43,15 @@ class Fingers:
     radius: float
     tips: Array
 
-    def near(self, q: Array, hands: Array) -> list[Touch]:
+    def near(self, q: Array, hands: Array) -> list[NearContact]:
         """Each finger's nearest place on the outline, and in a hollow the next one that faces it."""
         found = []
         for i, f in enumerate(self.tips):
             tip = transform(inverse(q), transform(hands[i if len(hands) > 1 else 0], f))
             for slot, (d, point, normal, feature) in enumerate(facing(self.outline, tip)[:2]):
-                found.append(Touch(d - self.radius, point, normal, i, feature, slot))
+                found.append(NearContact(d - self.radius, point, normal, i, feature, slot))
         # By their features: which of two places in a hollow is nearer changes with the rounding.
-        return sorted(found, key=lambda touch: (touch.finger, touch.feature))
+        return sorted(found, key=lambda place: (place.finger, place.feature))
 
     def advance(
         self, q: Array, hands: Array, step: Array, body: bool = False
@@ -146,7 +148,7 @@ class Fingers:
         s: float,
         h: float,
         held: Held,
-        touching: Sequence[Touch],
+        touching: Sequence[NearContact],
         twist: Array,
         now: list[str],
     ) -> tuple[Array, bool, list[str]]:

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...friction.surface import LimitSurface
 from ...geometry import Outline
 from ...geometry.pose import Array
-from . import runs, steps
+from . import contacts, runs, steps
 from .arrays import (
     COURSE,
     OUTLINE,
@@ -224,7 +224,7 @@ class Runner:
             start.x, start.y, start.angle = pose
             try:
                 if task.push_out:
-                    steps.push_out(setting, start, way[:count], room)
+                    contacts.push_out(setting, start, way[:count], room)
                 done.ends[r] = steps.follow(
                     setting, start, way, count, task.begin, task.kind, out, seen, room
                 )

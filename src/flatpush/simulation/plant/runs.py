@@ -6,8 +6,8 @@ from ...geometry import compose, inverse, log, transform, wrap_angle
 from ...geometry.pose import Array
 from .arrays import SeenRows
 from .codes import AS_IT_IS, BODY, MODES, OUTCOMES
+from .contacts import TOUCH
 from .plain import Fingers, facing
-from .steps import TOUCH
 
 
 def push_out(fingers: Fingers, q: Array, hands: Array) -> None:

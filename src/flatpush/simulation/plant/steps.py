@@ -7,12 +7,11 @@ for any number of contacts and any surface, is simulation.plant.plain.
 """
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from ...formulas import formula
-from .arrays import Move, OutlineArrays, Row, Rows, Scratch, Setting
+from ...geometry.displacement import displaced
+from .arrays import Move, Row, Rows, Scratch, Setting
 from .codes import (
     AS_IT_IS,
     BODY,
@@ -27,13 +26,12 @@ from .codes import (
     UNDECIDED,
 )
 from .contact_modes import one, two
+from .contacts import TOUCH, close_gaps, find_contacts, hand_at, least_gap, see
+from .facing import OVERLAP
 
 STEP = 1 / 60  # longest travel of the fingers in one step, by the outline's size
-TOUCH = 2e-8  # a gap up to this, by the outline's size, touches
-OVERLAP = 1e-5  # a deeper overlap at the start, by the outline's size, is inside
 CORNER_STEP = 0.25  # of the tip's radius: longest travel in a step round a corner,
 SHARP_STEP = 2e-4  # or this by the outline's size, for a sharp tip
-LEVER = 0.3  # of the outline's size: the length by which a turn is weighed against a shift where contacts are restored
 LOOKS = 8  # places on a step at which fingers that do not touch are watched
 HALVINGS = 5
 SETTLES = 4  # times that a step is shortened to where something touches
@@ -41,200 +39,8 @@ MOST_STEPS = 1_000_000  # of one motion between two poses
 ALL_THAT_TOUCH = -1  # a mask of contacts
 
 
-class Place(NamedTuple):
-    """Where an outline faces a point: signed distance, point in O, inward normal, and the feature.
-
-    Features: 2k an edge, 2k + 1 the corner at its start; of a circle 0; -1 where nothing faces it.
-    """
-
-    distance: float
-    x: float
-    y: float
-    nx: float
-    ny: float
-    feature: int
-
-
 @formula
-def nearest(outline: OutlineArrays, x: float, y: float) -> Place:
-    """The nearest place of the outline to a point in O."""
-    if outline.circle:
-        dx, dy = x - outline.x, y - outline.y
-        d = math.sqrt(dx * dx + dy * dy)
-        ux, uy = (dx / d, dy / d) if d > 0 else (1.0, 0.0)
-        R = outline.radius
-        return Place(d - R, outline.x + R * ux, outline.y + R * uy, -ux, -uy, 0)
-    best, found, corner = np.inf, 0, False
-    for i in range(len(outline.edges)):
-        edge = outline.edges[i]
-        dx, dy = x - edge.x, y - edge.y
-        s = dx * edge.ex + dy * edge.ey
-        if s < 0:
-            square = dx * dx + dy * dy
-            if square < best:
-                best, found, corner = square, i, True
-        elif s <= edge.length:
-            d = dx * edge.nx + dy * edge.ny
-            if d * d < best:
-                best, found, corner = d * d, i, False
-    edge = outline.edges[found]
-    dx, dy = x - edge.x, y - edge.y
-    nx, ny = edge.nx, edge.ny
-    if not corner:
-        s = dx * edge.ex + dy * edge.ey
-        return Place(-(dx * nx + dy * ny), edge.x + s * edge.ex, edge.y + s * edge.ey, nx, ny, 2 * found)
-    d = math.sqrt(best)
-    sign = 1.0 if edge.convex > 0.5 else -1.0
-    if d > 1e-12 * outline.size:
-        nx, ny = -sign * dx / d, -sign * dy / d
-    return Place(sign * d, edge.x, edge.y, nx, ny, 2 * found + 1)
-
-
-@formula
-def second(outline: OutlineArrays, x: float, y: float, taken: int) -> Place:
-    """As nearest, for another edge or corner that faces the point; distance inf if there is none.
-
-    Only an outline that is not convex can meet a round finger twice.
-    """
-    if outline.convex:
-        return Place(np.inf, 0.0, 0.0, 0.0, 0.0, -1)
-    best, found, corner = np.inf, -1, False
-    count = len(outline.edges)
-    least = -OVERLAP * outline.size
-    for i in range(count):
-        edge = outline.edges[i]
-        dx, dy = x - edge.x, y - edge.y
-        s = dx * edge.ex + dy * edge.ey
-        if s < 0:
-            if 2 * i + 1 == taken or edge.convex < 0.5:
-                continue
-            before = outline.edges[i - 1 if i > 0 else count - 1]
-            d = math.sqrt(dx * dx + dy * dy)
-            if (x - before.x) * before.ex + (y - before.y) * before.ey > before.length and d < best:
-                best, found, corner = d, i, True
-        elif s <= edge.length and 2 * i != taken:
-            d = -(dx * edge.nx + dy * edge.ny)
-            if least < d < best:
-                best, found, corner = d, i, False
-    if found < 0:
-        return Place(np.inf, 0.0, 0.0, 0.0, 0.0, -1)
-    edge = outline.edges[found]
-    dx, dy = x - edge.x, y - edge.y
-    if corner:
-        return Place(best, edge.x, edge.y, -dx / best, -dy / best, 2 * found + 1)
-    s = dx * edge.ex + dy * edge.ey
-    return Place(best, edge.x + s * edge.ex, edge.y + s * edge.ey, edge.nx, edge.ny, 2 * found)
-
-
-@formula
-def displaced(qx: float, qy: float, qt: float, a: float, b: float, w: float, s: float) -> Any:
-    """A pose moved by s times a body twist for unit time: X · exp(s V)."""
-    a, b, w = s * a, s * b, s * w
-    if abs(w) > 1e-4:  # below it the next term of the series is less than rounding
-        sine, versine = math.sin(w) / w, (1 - math.cos(w)) / w
-    else:
-        sine, versine = 1 - w * w / 6, w / 2 - w * w * w / 24
-    x, y = sine * a - versine * b, versine * a + sine * b
-    c, d = math.cos(qt), math.sin(qt)
-    return qx + c * x - d * y, qy + d * x + c * y, qt + w
-
-
-@formula
-def _hand_at(move: Move, k: int, s: float) -> Any:
-    """The pose of hand k after a part s of its step."""
-    hand, step = move.hands[k], move.steps[k]
-    if move.kind == BODY:
-        return displaced(hand.x, hand.y, hand.angle, step.x, step.y, step.angle, s)
-    return hand.x + s * step.x, hand.y + s * step.y, hand.angle + s * step.angle
-
-
-@formula
-def _tip(setting: Setting, move: Move, i: int, s: float, qx: float, qy: float, qt: float) -> Any:
-    """The centre of fingertip i in O, with the object at the pose q."""
-    hx, hy, ht = _hand_at(move, i if len(move.hands) > 1 else 0, s)
-    finger = setting.fingers[i]
-    c, d = math.cos(ht), math.sin(ht)
-    x, y = hx + c * finger.x - d * finger.y - qx, hy + d * finger.x + c * finger.y - qy
-    c, d = math.cos(qt), math.sin(qt)
-    return c * x + d * y, c * y - d * x
-
-
-@formula
-def _gap(setting: Setting, move: Move, s: float, qx: float, qy: float, qt: float, mask: int) -> float:
-    """The least gap of the fingers' contacts that are not in the mask, two bits to a finger."""
-    least = np.inf
-    for i in range(len(setting.fingers)):
-        x, y = _tip(setting, move, i, s, qx, qy, qt)
-        place = nearest(setting.outline, x, y)
-        other = np.inf
-        if mask >> (2 * i) & 1:
-            if not mask >> (2 * i + 1) & 1:
-                other = second(setting.outline, x, y, place.feature).distance
-        else:
-            other = place.distance
-        least = min(least, other - setting.radius)
-    return least
-
-
-@formula
-def _set_contact(contact: Row, setting: Setting, move: Move, i: int, s: float, q: Any, place: Place) -> None:
-    """Writes a contact of finger i at a place, with the object at the pose q."""
-    # The finger turns with its hand: its material velocity at the contact, in O.
-    k = i if len(move.hands) > 1 else 0
-    hx, hy, ht = _hand_at(move, k, s)
-    step = move.steps[k]
-    qx, qy, qt = q
-    co, so = math.cos(qt), math.sin(qt)
-    rx, ry = qx + co * place.x - so * place.y - hx, qy + so * place.x + co * place.y - hy
-    ux, uy = step.x, step.y
-    if move.kind == BODY:
-        ch, sh = math.cos(ht), math.sin(ht)
-        ux, uy = ch * step.x - sh * step.y, sh * step.x + ch * step.y
-    ux, uy = ux - step.angle * ry, uy + step.angle * rx
-    contact.x, contact.y, contact.nx, contact.ny = (
-        place.x - setting.cof_x,
-        place.y - setting.cof_y,
-        place.nx,
-        place.ny,
-    )
-    contact.ux, contact.uy = co * ux + so * uy, co * uy - so * ux
-    contact.gap, contact.finger, contact.feature = place.distance - setting.radius, i, place.feature
-
-
-@formula
-def _contacts(
-    setting: Setting, move: Move, s: float, qx: float, qy: float, qt: float, mask: int, contacts: Rows
-) -> Any:
-    """Writes the contacts in the mask, or all that touch; returns their number and the mask."""
-    count, found = 0, 0
-    touch = TOUCH * setting.outline.size
-    for i in range(len(setting.fingers)):
-        x, y = _tip(setting, move, i, s, qx, qy, qt)
-        place = nearest(setting.outline, x, y)
-        first = place.distance - setting.radius <= touch if mask < 0 else (mask >> (2 * i) & 1) == 1
-        if not first and place.distance - setting.radius > touch:
-            continue
-        other = second(setting.outline, x, y, place.feature)
-        if mask < 0:
-            both = other.distance - setting.radius <= touch
-        else:
-            both = (mask >> (2 * i + 1) & 1) == 1 and other.distance < np.inf
-        found |= (1 if first else 0) << (2 * i) | (1 if both else 0) << (2 * i + 1)
-        # In a hollow by their features: which of two touching places is nearer changes with the rounding.
-        if both and (not first or other.feature < place.feature):
-            place, other = other, place
-        if (first or both) and count < len(contacts):
-            _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), place)
-        count += 1 if first or both else 0
-        if first and both:
-            if count < len(contacts):
-                _set_contact(contacts[count], setting, move, i, s, (qx, qy, qt), other)
-            count += 1
-    return count, found
-
-
-@formula
-def _twist(setting: Setting, count: int, scratch: Scratch) -> Any:
+def _twist(setting: Setting, count: int, scratch: Scratch) -> tuple[int, int, int, float, float, float]:
     """Status, modes and the body twist about O's origin of the contacts in the scratch."""
     c, ell, mu = scratch.contacts, setting.surface.unit, setting.friction
     if count == 0:
@@ -258,7 +64,7 @@ def _twist(setting: Setting, count: int, scratch: Scratch) -> Any:
 
 
 @formula
-def _slope(ma: float, mb: float, mw: float, a: float, b: float, w: float) -> Any:
+def _slope(ma: float, mb: float, mw: float, a: float, b: float, w: float) -> tuple[float, float, float]:
     """Rate of the displacement's logarithm when the body, displaced by exp(m), has a body twist V.
 
     V + [m, V] / 2 + [m, [m, V]] / 12: the inverse of the exponential's differential to the order of the step.
@@ -266,68 +72,6 @@ def _slope(ma: float, mb: float, mw: float, a: float, b: float, w: float) -> Any
     x, y = -mw * b + w * mb, mw * a - w * ma
     u, v = -mw * y, mw * x
     return a + 0.5 * x + u / 12, b + 0.5 * y + v / 12, w
-
-
-@formula
-def _settle(setting: Setting, move: Move, s: float, q: Row, mask: int, lax: int, contacts: Rows) -> None:
-    """Moves the object so that the contacts of the mask touch exactly, those of the bits `lax` only if they overlap.
-
-    Three times, so that what the curved normals leave is of fourth order.
-    """
-    ell = LEVER * setting.outline.size
-    for _ in range(3):
-        count, _ = _contacts(setting, move, s, q.x, q.y, q.angle, mask, contacts)
-        ga = gb = ax = ay = at = bx = by = bt = 0.0
-        rows = 0
-        for i in range(min(count, 2)):
-            c = contacts[i]
-            if lax >> i & 1 and c.gap >= 0:
-                continue
-            t = (c.x * c.ny - c.y * c.nx) / ell
-            if rows == 0:
-                ax, ay, at, ga = c.nx, c.ny, t, -c.gap
-            else:
-                bx, by, bt, gb = c.nx, c.ny, t, -c.gap
-            rows += 1
-        if rows == 0 or max(abs(ga), abs(gb)) < 1e-15 * setting.outline.size:
-            return
-        if rows == 1:
-            # One contact: along its normal, without a turn, as the finger's push leaves its bearing.
-            x, y, w = ga * ax, ga * ay, 0.0
-        else:
-            # The least move that closes both gaps; where the two normals are nearly one, the mean of both.
-            a, b, ab = ax * ax + ay * ay + at * at, bx * bx + by * by + bt * bt, ax * bx + ay * by + at * bt
-            lift = 1e-9 * (a + b)
-            det = (a + lift) * (b + lift) - ab * ab
-            p, r = ((b + lift) * ga - ab * gb) / det, ((a + lift) * gb - ab * ga) / det
-            x, y, w = p * ax + r * bx, p * ay + r * by, (p * at + r * bt) / ell
-        # About the COF.
-        co, so = math.cos(q.angle), math.sin(q.angle)
-        x, y = x + w * setting.cof_y, y - w * setting.cof_x
-        q.x += co * x - so * y
-        q.y += so * x + co * y
-        q.angle += w
-
-
-@formula
-def push_out(setting: Setting, q: Row, hands: Rows, scratch: Scratch) -> None:
-    """Moves an object at q that overlaps fingers out of them, the shortest way."""
-    for k in range(len(hands)):
-        scratch.steps[k].x = scratch.steps[k].y = scratch.steps[k].angle = 0.0
-    move = Move(hands, scratch.steps, AS_IT_IS)
-    for _ in range(50):
-        worst, mask = 0.0, 0
-        for i in range(len(setting.fingers)):
-            x, y = _tip(setting, move, i, 0.0, q.x, q.y, q.angle)
-            place = nearest(setting.outline, x, y)
-            if place.distance - setting.radius < 0:
-                mask |= 1 << (2 * i)
-                worst = max(worst, setting.radius - place.distance)
-            if second(setting.outline, x, y, place.feature).distance - setting.radius < 0:
-                mask |= 1 << (2 * i + 1)
-        if worst <= TOUCH * setting.outline.size:  # every step closes what touches
-            break
-        _settle(setting, move, 0.0, q, mask, 0, scratch.contacts)
 
 
 @formula
@@ -339,15 +83,6 @@ def _travel(setting: Setting, move: Move) -> float:
         reach = math.hypot(setting.fingers[i].x, setting.fingers[i].y) + setting.outline.size
         travel = max(travel, math.hypot(step.x, step.y) + abs(step.angle) * reach)
     return travel
-
-
-@formula
-def _see(setting: Setting, move: Move, s: float, q: Row, now: Rows) -> None:
-    """Writes each finger's nearest point and gap."""
-    for i in range(len(setting.fingers)):
-        x, y = _tip(setting, move, i, s, q.x, q.y, q.angle)
-        place = nearest(setting.outline, x, y)
-        now[i].x, now[i].y, now[i].gap = place.x, place.y, place.distance - setting.radius
 
 
 @formula
@@ -365,14 +100,14 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
     travel = _travel(setting, move)
     for i in range(fingers):
         now[i].modes, now[i].mode = 0, REST
-    if _gap(setting, move, 0.0, q.x, q.y, q.angle, 0) < -OVERLAP * size:
+    if least_gap(setting, move, 0.0, q.x, q.y, q.angle, 0) < -OVERLAP * size:
         return INSIDE
     s, status = 0.0, GOING
     for _ in range(MOST_STEPS):
         if s >= 1.0:
             break
         qx, qy, qt = q.x, q.y, q.angle
-        n, mask = _contacts(setting, move, s, qx, qy, qt, ALL_THAT_TOUCH, c)
+        n, mask = find_contacts(setting, move, s, qx, qy, qt, ALL_THAT_TOUCH, c)
         status, m0, m1, a, b, w = _twist(setting, n, scratch)
         if status != GOING:
             if status == JAMMED:
@@ -390,7 +125,7 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
                 stretch = min(stretch, max(CORNER_STEP * radius, SHARP_STEP * size))
         if n == 0:
             # Nothing moves the object before the fingers have come across the gap.
-            stretch = max(stretch, 0.9 * _gap(setting, move, s, qx, qy, qt, mask))
+            stretch = max(stretch, 0.9 * least_gap(setting, move, s, qx, qy, qt, mask))
         h = (1 - s) / max(1.0, math.ceil((1 - s) * travel / stretch - 1e-9))
         shortest = h / (1 << HALVINGS)
         settled = 0
@@ -407,7 +142,7 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
                     share = 0.5 if stage < 2 else 1.0
                     ma, mb, mw = share * h * a1, share * h * b1, share * h * w1
                     x, y, t = displaced(qx, qy, qt, ma, mb, mw, 1.0)
-                    n1, _ = _contacts(setting, move, s + share * h, x, y, t, mask, c)
+                    n1, _ = find_contacts(setting, move, s + share * h, x, y, t, mask, c)
                     status, e0, e1, ta, tb, tw = _twist(setting, n1, scratch)
                     if status != GOING or n1 != n:
                         changed = True
@@ -436,7 +171,7 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
         s = 1.0 if s + h > 1 - 1e-12 else s + h
         if n > 0:
             lax = (1 if e0 in (SEPARATION, REST) else 0) | (2 if e1 in (SEPARATION, REST) else 0)
-            _settle(setting, move, s, q, mask, lax, c)
+            close_gaps(setting, move, s, q, mask, lax, c)
         for i in range(fingers):
             mode = -1
             if i0 == i:
@@ -449,10 +184,10 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
             now[i].modes |= 1 << mode
     else:
         status = UNDECIDED
-    _see(setting, move, s, q, now)
+    see(setting, move, s, q, now)
     for k in range(len(move.hands)):
         hand = move.hands[k]
-        hand.x, hand.y, hand.angle = _hand_at(move, k, s)
+        hand.x, hand.y, hand.angle = hand_at(move, k, s)
     return status
 
 
@@ -466,13 +201,13 @@ def _first_touch(
     """
     a, b, w = V
     qx, qy, qt = q.x, q.y, q.angle
-    if _gap(setting, move, s, qx, qy, qt, mask) >= near:
+    if least_gap(setting, move, s, qx, qy, qt, mask) >= near:
         return False, 0.0
     before, hit = 0.0, -1.0
     for look in range(1, LOOKS + 1):
         at = look / LOOKS
         x, y, t = displaced(qx, qy, qt, a, b, w, at * h)
-        if _gap(setting, move, s + at * h, x, y, t, mask) < 0:
+        if least_gap(setting, move, s + at * h, x, y, t, mask) < 0:
             hit = at
             break
         before = at
@@ -481,7 +216,7 @@ def _first_touch(
     while hit - before > 1e-12:
         middle = 0.5 * (before + hit)
         x, y, t = displaced(qx, qy, qt, a, b, w, middle * h)
-        gap = _gap(setting, move, s + middle * h, x, y, t, mask)
+        gap = least_gap(setting, move, s + middle * h, x, y, t, mask)
         if gap < 0:
             hit = middle
         else:
