@@ -367,7 +367,8 @@ class PlanningPart(Part):
     )
     margin: MarginPart = Field(default_factory=MarginPart, description="{friction: 0.2, clearance: 0}.")
     goal_tolerance: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
-        default_factory=list, description="[x, y, angle]; 0.5 mm, 0.5 mm and 0.5° if left out."
+        default_factory=list,
+        description="[x, y, angle]; 0.5 mm, 0.5 mm and 0.5° if left out; plans use what is wider.",
     )
     robust: bool = Field(
         default=False, description="true: minimise the cost after small errors of the switch poses."

@@ -69,7 +69,7 @@ planning:
   margin:
     friction: 0.2                 # the part by which the friction cone is narrowed
     clearance: 0                  # distance from obstacles and bounds
-  goal_tolerance: [0.5, 0.5, 0.5]
+  goal_tolerance: [0.5, 0.5, 0.5] # plans end where it is cheapest within what is wider than this
   robust: false                   # true: keep the cost low after small errors of the switch poses
   seed: 0                         # of the random search
   iterations: 10000               # the search stops here

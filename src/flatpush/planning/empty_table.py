@@ -1,8 +1,9 @@
 """Strategies of the search where nothing is in the way: the words of each push, and plans of many pushes refined."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +15,11 @@ from ..steering.three_twist import words
 from .path import Path
 from .query import Query
 
+if TYPE_CHECKING:
+    from .refine import Refined
+
 ROUND = 3300  # of the scene's iterations, that a round of the refinement counts as
+SEEDS = 4  # of the last paths to the goal, from which those within the tolerance start
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,32 +49,43 @@ def direct_paths(fleet: Fleet, start: Array, endpoints: Array) -> list[Path]:
 
 
 def refined_paths(scene: Scene, fleet: Fleet) -> Iterator[Found]:
-    """Better and better paths of one or many pushes, within the scene's limits."""
-    goal = np.nan_to_num(scene.goal_pose)
+    """Better and better paths of one or many pushes, within the scene's limits.
+
+    They end at the goal. Where the tolerance is wide, one more follows, which ends within it as it costs least.
+    """
+    goal, planning, slack = np.nan_to_num(scene.goal_pose), scene.planning, scene.goal_slack
     from .refine import improvements
 
-    planning = scene.planning
-    search = improvements(
-        Query(fleet, scene.start_pose, goal, free=scene.free_angle, robust=planning.robust),
-        seed=planning.seed,
-    )
+    query = Query(fleet, scene.start_pose, goal, free=scene.free_angle, robust=planning.robust)
     began = clock()
     rounds = max(1, planning.iterations // ROUND)
-    for done, refined in enumerate(search):
+    seeds, late = [], False
+    for done, refined in enumerate(improvements(query, seed=planning.seed)):
         late = done >= 1 and clock() - began > planning.time_limit
-        pieces = [
-            (int(push), "LSR".index(letter), float(amount))
-            for push, word, amounts in zip(refined.pushes, refined.words, refined.amounts, strict=True)
-            for letter, amount in zip(word, amounts, strict=True)
-        ]
-        details: dict[str, Any] = {
-            "cost_before_refinement": refined.cost_before,
-            "replanning_cost": refined.replanning_cost,
-            "rounds": done,
-        }
-        if late and done < rounds:
-            details["stopped_by"] = "time_limit"
-        cost = refined.replanning_cost if planning.robust else refined.cost
-        yield Found(Path.of(fleet, np.array(scene.start_pose), pieces), cost, details)
+        yield _found(scene, fleet, refined, late and done < rounds)
+        seeds.append((refined.pushes, refined.poses))
         if late or done >= rounds:
-            return
+            break
+    if not scene.wide_goal:
+        return
+    wide = replace(query, free=slack[2] >= np.pi, slack=slack)
+    search = improvements(wide, seeds[-SEEDS:], seed=planning.seed)
+    refined = list(islice(search, 1 if late else 2))[-1]
+    yield _found(scene, fleet, refined, late)
+
+
+def _found(scene: Scene, fleet: Fleet, refined: "Refined", stopped: bool) -> Found:
+    pieces = [
+        (int(push), "LSR".index(letter), float(amount))
+        for push, word, amounts in zip(refined.pushes, refined.words, refined.amounts, strict=True)
+        for letter, amount in zip(word, amounts, strict=True)
+    ]
+    details: dict[str, Any] = {
+        "cost_before_refinement": refined.cost_before,
+        "replanning_cost": refined.replanning_cost,
+        "rounds": refined.rounds,
+    }
+    if stopped:
+        details["stopped_by"] = "time_limit"
+    cost = refined.replanning_cost if scene.planning.robust else refined.cost
+    return Found(Path.of(fleet, np.array(scene.start_pose), pieces), cost, details)

@@ -155,7 +155,7 @@ class Planner:
         """The cheapest single push, then what the refinement finds; all words of the push if it is the only one."""
         endpoints = self._endpoints(scene)
         singles = direct_paths(self.fleet, scene.start_pose, endpoints)
-        several = len(self.usable) > 1
+        several = len(self.usable) > 1 or scene.wide_goal
         single = {"single_cost": singles[0].cost}
         for path in singles[:1] if several else singles:
             yield Found(path, path.cost, dict(single))

@@ -43,6 +43,7 @@ class Query:
             0 if it is lifted.
         inside: whether a change of push needs room to turn the hand anyhow within the bounds.
         free: whether the object may have any angle at the goal, whose own is then one of them.
+        slack: how far from the goal the end may be, shape (3,) [m, m, rad]; its angle counts unless that is free.
         robust: whether a path is judged by what it costs when every switch pose is missed by a little and the next
             push is planned again (offsets), instead of by its own cost.
 
@@ -60,6 +61,7 @@ class Query:
     room: float = 0.0
     inside: bool = False
     free: bool = False
+    slack: Array = field(default_factory=lambda: np.zeros(3))
     robust: bool = False
 
     def __post_init__(self) -> None:

@@ -245,6 +245,10 @@ class Workspace:
         object.__setattr__(self, "obstacles", tuple(outlines))
 
 
+# By default, and what a plan leaves of a wider tolerance to whoever carries it out [m, m, rad].
+GOAL_TOLERANCE = (0.0005, 0.0005, float(np.deg2rad(0.5)))
+
+
 @dataclass(frozen=True)
 class Planning:
     """How to plan; the defaults are those of the scene document, in SI.
@@ -256,7 +260,7 @@ class Planning:
         switch_cost: of a change of contact, in the unit of the cost [m or s]; None: 0.03 m for flat, else 0.
         friction_margin: the share of the friction, and of the spacing, that may be missing, in [0, 1).
         clearance: of object and fingers from obstacles and bounds, at least [m].
-        goal_tolerance: in x, y and angle [m, m, rad].
+        goal_tolerance: in x, y and angle [m, m, rad]; a plan uses what is wider than the default (Scene.goal_slack).
         robust: whether the cost after small errors of the switch poses is made small instead.
         seed: of the random search, a number from 0.
         iterations: how many the search makes at most.
@@ -270,7 +274,7 @@ class Planning:
     switch_cost: float | None = None
     friction_margin: float = 0.2
     clearance: float = 0.0
-    goal_tolerance: tuple[float, float, float] = (0.0005, 0.0005, float(np.deg2rad(0.5)))
+    goal_tolerance: tuple[float, float, float] = GOAL_TOLERANCE
     robust: bool = False
     seed: int = 0
     iterations: int = 10000
@@ -371,6 +375,23 @@ class Scene:
     def free_angle(self) -> bool:
         """Whether the object may have any angle at the goal."""
         return bool(np.isnan(self.goal_pose[2]))
+
+    @property
+    def goal_slack(self) -> Array:
+        """How far from the goal a plan may end, shape (3,) [m, m, rad]; half a turn where any angle will do.
+
+        The default tolerance is left for errors on the way, so that by default a plan ends at the goal.
+        """
+        slack = np.maximum(np.subtract(self.planning.goal_tolerance, GOAL_TOLERANCE), 0.0)
+        if self.free_angle or self.planning.goal_tolerance[2] >= np.pi:
+            slack[2] = np.pi
+        return slack
+
+    @property
+    def wide_goal(self) -> bool:
+        """Whether a plan may end somewhere else than the goal asks."""
+        x, y, angle = self.goal_slack
+        return bool(x or y or (angle and not self.free_angle))
 
     def goal_error(self, pose: ArrayLike) -> Array:
         """A pose X_WO less the goal, shape (3,) [m, m, rad]: the angle wrapped, and 0 where any will do."""

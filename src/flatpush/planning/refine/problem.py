@@ -1,7 +1,7 @@
 """Sequences of pushes with their switch poses: what they cost, and how they are moved to where they cost less."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..query import Query, offsets
 from .descent import Work, descend
 
 ANGLES = 24  # at a goal with a free angle, that seeds end with; the descent moves on from them
+THOROUGH = 4  # repeats of a descent after which a plan also slides to the cheapest end
+SLIDES = 30
+PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the way to a side of the goal's box
 SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
@@ -42,8 +45,8 @@ class Sequences:
     """What sequences of pushes from the start to the goal of a query cost on an empty table.
 
     Attributes:
-        fleet, start, goal, free: of the query.
-        endpoints: where plans may end, shape (e, 3): the goal alone, or with several angles where any will do.
+        fleet, start, goal, free, slack: of the query.
+        endpoints: where plans may end, shape (e, 3): the goal first, then others about it where they will do.
         least: that the flat path of each leg of a plan with several pushes is long [m].
         cars: the fleet as records; changes: its switching costs; flat: whether all are Dubins cars.
         offsets: displacements of the switch poses for the cost of replanning, shape (16, 3).
@@ -53,6 +56,7 @@ class Sequences:
     start: Array
     goal: Array
     free: bool
+    slack: Array
     endpoints: Array
     least: float
     cars: Records
@@ -67,7 +71,7 @@ class Sequences:
             raise InputError("the least length of a leg is 0 or more", value=least)
         fleet = query.fleet
         return cls(
-            fleet, query.start, query.goal, query.free, _endpoints(query), float(least), fleet.cars,
+            fleet, query.start, query.goal, query.free, query.slack, _ends(query), float(least), fleet.cars,
             fleet.switching.tolist(), offsets(), fleet.is_dubins,
         )  # fmt: skip
 
@@ -98,24 +102,35 @@ class Sequences:
 
     def direct(self) -> Candidate:
         """The best single push."""
-        endpoints = self.endpoints[: self.fleet.size if self.free else 1]
-        return min(
-            (
-                self.candidate(np.array([k]), np.array([self.start, end]))
-                for k in range(self.fleet.size)
-                for end in endpoints
-            ),
-            key=lambda found: found.cost,
+        singles = (
+            min(
+                (self.candidate(np.array([k]), np.array([self.start, end])) for end in self.endpoints),
+                key=lambda found: found.cost,
+            )
+            for k in range(self.fleet.size)
         )
+        return min((self._slid(single, np.zeros(3)) for single in singles), key=lambda found: found.cost)
 
     def descend(self, found: Candidate, repeats: int, steps: int) -> Candidate:
-        """The sequence with its switch poses moved downhill; infinite if a leg stays too short (a single one may)."""
-        pushes, poses, best = found.pushes, found.poses, np.inf
+        """The sequence with its switch poses moved downhill; infinite if a leg stays too short (a single one may).
+
+        After several repeats its end slides as well, to where it is the cheapest within the slack.
+        """
+        found, slopes = self._descended(found, repeats, steps)
+        return self._slid(found, slopes) if repeats >= THOROUGH else found
+
+    def _descended(
+        self, found: Candidate, repeats: int, steps: int, end: Array | None = None
+    ) -> tuple[Candidate, Array]:
+        """The same at a fixed end, or led to another, and what the cost changes when it moves [per m, m, rad]."""
+        pushes, poses, best, slopes = found.pushes, found.poses, np.inf, np.zeros(3)
         here = poses.copy()
         for repeat in range(repeats + 1):
             cost, words = self.chain(pushes, here)
             if cost == np.inf:
                 break
+            if repeat == 0 and end is not None:
+                here[-1], cost = end, np.inf  # with the words so far: those from the old poses may jump
             better = cost < best - 1e-7 * cost
             if cost < best and words["flat"].min() >= self.least * (1.0 - 1e-9):
                 best, poses = cost, here.copy()
@@ -124,7 +139,33 @@ class Sequences:
             work = Work.of(words, here, self.least, float(self.fleet.radius[pushes[0]]), self.free)
             if not descend(work, self.cars, pushes, words, here, steps):
                 break
-        return Candidate(best + self.switching(pushes), pushes, poses)
+            slopes = work.lam[:3]
+        return Candidate(best + self.switching(pushes), pushes, poses), slopes
+
+    def _slid(self, found: Candidate, slopes: Array) -> Candidate:
+        """The sequence with its end moved within the slack to where the cost is least nearby, most often a corner.
+
+        The slopes tell the way; a side of the box is also tried on its own.
+        """
+        movable = self.slack * [1.0, 1.0, 0.0 if self.free else 1.0] > 0.0
+        if not movable.any() or not np.isfinite(found.cost):
+            return found
+        sides = [sign * axis for axis in np.eye(3)[movable] for sign in (-1.0, 1.0)]
+        for _ in range(SLIDES):
+            before = found
+            for towards, part in product([-np.sign(slopes) * movable, *sides], PARTS):
+                end = before.poses[-1]
+                end = end + part * np.where(towards == 0.0, 0.0, self.goal + towards * self.slack - end)
+                if len(found.pushes) == 1:
+                    moved, after = self.candidate(found.pushes, np.array([self.start, end])), slopes
+                else:
+                    moved, after = self._descended(before, 2, 40, end)
+                if moved.cost < found.cost * (1 - 1e-9):
+                    found, slopes = moved, after
+                    break
+            if found is before:
+                break
+        return found
 
     def replanning(self, found: Candidate) -> float:
         """Mean cost when every leg but the first starts off its switch pose, over sixteen fixed displacements.
@@ -171,10 +212,18 @@ class Sequences:
         )
 
 
-def _endpoints(query: Query) -> Array:
-    """The goal; or, where any angle will do, with the best one of every single push first, and then all around."""
-    if not query.free:
+def _ends(query: Query) -> Array:
+    """The goal, and others within the slack: middle, sides and corners, with the cheapest angle of every single push.
+
+    Where any angle will do, there are also some all around.
+    """
+    x, y, theta = query.goal
+    turn = np.pi if query.free else query.slack[2]
+    if not (query.slack[:2].any() or turn):
         return query.goal[None]
-    _, headings = cheapest_headings(query.fleet, query.start, query.goal[:2])
-    angles = np.concatenate([headings[:, 0], np.arange(ANGLES) * (2 * np.pi / ANGLES)])
-    return np.column_stack([np.tile(query.goal[:2], (len(angles), 1)), angles])
+    (dx, dy), steps = query.slack[:2], (0.0, -1.0, 1.0)
+    places = np.unique([(x + i * dx, y + j * dy) for i in steps for j in steps], axis=0)
+    _, headings = cheapest_headings(query.fleet, query.start, places, theta, turn)
+    angles = 2 * np.pi / ANGLES * np.arange(ANGLES) if query.free else theta + turn * np.array(steps)
+    ends = [(*places[m], angle) for m in range(len(places)) for angle in (*headings[:, m], *angles)]
+    return np.array([*([] if query.free else [query.goal]), *ends])
