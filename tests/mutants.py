@@ -3,18 +3,22 @@
     python tests/mutants.py [PART OF A FILE'S NAME]
 
 Reads tests/mutants/*.yaml, lists of {file, old, new, test}: in src/flatpush/<file> the text `old`, which stands there
-once, becomes `new`, and the test (a pytest node, or several) must then fail. The change is made in a copy of src;
-nothing of the checkout is touched. Entries with `kernel: true` change compiled code and start with an empty cache of
-kernels, because numba does not notice a callee that changed in another file; all others share one.
+once, becomes `new`, and the test (a pytest node, or several) must then fail. The changes are made in copies of src, of
+which there are two, so that two tests run at a time; nothing of the checkout is touched. All share the cache of kernels
+(NUMBA_CACHE_DIR, or one of their own): a kernel is known by what it computes, so a changed one is compiled anew.
 """
 
+import compileall
 import os
+import py_compile
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from queue import SimpleQueue
 
 import yaml
 
@@ -22,6 +26,7 @@ ROOT = Path(__file__).parents[1]
 TIMEOUT = 600  # of one test with a change [s]; a test that hangs has noticed it
 # Of pytest: tests failed. Others mean that the test was not run.
 FAILED = 1
+COPIES = 2  # tests that run at a time
 
 
 def entries(part: str = "") -> list[dict[str, str]]:
@@ -43,18 +48,21 @@ def problems(listed: list[dict[str, str]]) -> Iterator[str]:
                 yield f"there is no test {node}"
 
 
-def survives(entry: dict[str, str], folder: Path) -> str:
-    """Why a change counts as not noticed; empty if the test failed with it."""
-    copy = folder / "src"
-    if not copy.exists():
-        shutil.copytree(ROOT / "src", copy, ignore=shutil.ignore_patterns("__pycache__"))
+def copied(folder: Path) -> Path:
+    """A copy of src, compiled to bytecode that is known by the text it was made of."""
+    shutil.copytree(ROOT / "src", folder, ignore=shutil.ignore_patterns("__pycache__"))
+    compileall.compile_dir(folder, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
+    return folder
+
+
+def survives(entry: dict[str, str], copy: Path, kernels: str) -> str:
+    """Why a change of a copy of src counts as not noticed; empty if the test failed with it."""
     file = copy / "flatpush" / entry["file"]
     original = file.read_text()
-    cache = Path(tempfile.mkdtemp(dir=folder)) if entry.get("kernel") else folder / "kernels"
     environment = {
         **os.environ,
         "PYTHONPATH": str(copy),
-        "NUMBA_CACHE_DIR": str(cache),
+        "NUMBA_CACHE_DIR": kernels,
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     file.write_text(original.replace(entry["old"], entry["new"]))
@@ -92,9 +100,21 @@ def main(part: str = "") -> int:
     wrong = list(problems(listed))
     print(*wrong, sep="\n")
     alive = 0
-    with tempfile.TemporaryDirectory() as folder:
-        for entry in [] if wrong else listed:
-            why = survives(entry, Path(folder))
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(COPIES) as workers:
+        kernels = os.environ.get("NUMBA_CACHE_DIR") or str(Path(folder, "kernels"))
+        copies: SimpleQueue[Path] = SimpleQueue()
+        for number in range(COPIES):
+            copies.put(copied(Path(folder, f"src{number}")))
+
+        def noticed(entry: dict[str, str]) -> str:
+            copy = copies.get()
+            try:
+                return survives(entry, copy, kernels)
+            finally:
+                copies.put(copy)
+
+        chosen = [] if wrong else listed
+        for entry, why in zip(chosen, workers.map(noticed, chosen), strict=True):
             alive += bool(why)
             print(
                 f"{'ALIVE' if why else 'killed'}  {entry['file']}: {entry['old']} → {entry['new']}  {why}",

@@ -7,11 +7,13 @@ from flatpush.experiments.feedback import attempt, task
 pytestmark = pytest.mark.slow
 
 
-def test_nearly_all_of_two_hundred_tasks_end_within_the_tolerance():
-    asked = [t for t in map(task, range(200)) if t.steerable]
-    assert len(asked) >= 190
+@pytest.mark.parametrize("first", range(0, 80, 20))
+def test_of_twenty_tasks_at_most_one_ends_beside_its_goal(first):
+    """`python benchmarks/feedback_study.py 400` runs them all."""
+    asked = [t for t in map(task, range(first, first + 20)) if t.steerable]
+    assert len(asked) >= 18
     ends = [attempt(t)[0] for t in asked]
-    assert sum(end.good for end in ends) >= 0.95 * len(ends)
+    assert sum(end.good for end in ends) >= len(ends) - 1
     # What ends off the goal says so.
     assert all(end.outcome.startswith(("still ", "no ")) for end in ends if not end.good)
 
