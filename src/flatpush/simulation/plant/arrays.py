@@ -196,7 +196,7 @@ SCRATCH = np.dtype(
         ("contacts", CONTACT, 4),
         ("rays", RAY, 4),
         ("planes", RAY, 12),
-        ("q", POSE, 1),
+        ("q", POSE, (1,)),  # one row, not a row by itself, for every numpy
         ("hands", POSE, 2),
         ("steps", POSE, 2),
         ("now", SEEN, 2),
@@ -206,8 +206,11 @@ SCRATCH = np.dtype(
 
 def scratch() -> Scratch:
     """Room for the steps of one or two fingers, interpreted."""
-    rooms = {name: SCRATCH[name].subdtype or (SCRATCH[name], (1,)) for name in Scratch._fields}
-    return Scratch(**{name: blank(dtype, count) for name, (dtype, (count,)) in rooms.items()})
+    made = {}
+    for name in Scratch._fields:
+        field = SCRATCH[name]
+        made[name] = blank(field.base, field.shape[0])
+    return Scratch(**made)
 
 
 def blank(dtype: np.dtype, count: int) -> list[Row]:
