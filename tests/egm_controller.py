@@ -15,55 +15,9 @@ import sys
 import numpy as np
 from abb_robot_client._egm_protobuf import egm_pb2
 
+from simulated_tools import Cell, Ideal
+
 PERIOD, MISSED = 0.004, 25
-LAG = 0.02  # [s]
-
-
-class Ideal:
-    """A tool that follows with a lag."""
-
-    def __init__(self, home):
-        self.pose, self.wanted = np.array(home, dtype=float), np.array(home, dtype=float)
-
-    def step(self, target, twist):
-        if target is not None:
-            self.wanted = target + LAG * twist
-        self.pose = self.pose + (1 - math.exp(-PERIOD / LAG)) * (self.wanted - self.pose)
-
-    def halt(self):
-        self.wanted = self.pose.copy()
-
-    object = None
-
-
-class Cell:
-    """The tool and the object of a plan in MuJoCo."""
-
-    def __init__(self, plan, start):
-        import flatpush as fp
-        from flatpush.execution.cell.robot import CellRobot
-        from flatpush.execution.simulated import Unknown
-
-        self.robot = CellRobot(fp.load_plan(plan), Unknown(start=start)).__enter__()
-
-    @property
-    def pose(self):
-        return self.robot.state().pose
-
-    @property
-    def object(self):
-        return [float(v) for v in self.robot.object]
-
-    def step(self, target, twist):
-        from flatpush.execution import Target
-
-        now = self.robot.clock.now()
-        if target is not None:
-            self.robot.send(Target(now + PERIOD, target, twist))
-        self.robot.clock.wait(now + PERIOD)
-
-    def halt(self):
-        self.robot.stop()
 
 
 def message(cycle, pose, alive):
@@ -103,7 +57,7 @@ def main():
         "--freeze", type=int, default=-1, help="says nothing any more from this answered cycle on"
     )
     asked = parser.parse_args()
-    arm = Cell(asked.plan, asked.start) if asked.plan else Ideal(asked.home)
+    arm = Cell(asked.plan, asked.start, PERIOD) if asked.plan else Ideal(asked.home, PERIOD)
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     line.bind(("127.0.0.1", 0))
     print(json.dumps({"port": line.getsockname()[1]}), flush=True)

@@ -1,6 +1,5 @@
 """Externally Guided Motion over loopback: a simulated controller in a process of its own, judged by its cycles."""
 
-import json
 import math
 import os
 import socket
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulated_controller import SimulatedController
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
@@ -32,39 +32,10 @@ def free_port():
         return line.getsockname()[1]
 
 
-class Controller:
-    """The process."""
-
+class Controller(SimulatedController):
     def __init__(self, *options, port=None):
         self.port = port or free_port()
-        words = [
-            sys.executable,
-            str(SCRIPT),
-            "--port",
-            str(self.port),
-            "--home",
-            *map(str, HOME),
-            *map(str, options),
-        ]
-        self.process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=dict(os.environ)
-        )
-        self.process.stdout.readline()
-
-    def asked(self):
-        """What it saw until now."""
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdin.close()
-        self.process.stdout.close()
+        super().__init__("egm_controller.py", "--port", self.port, "--home", *HOME, *options)
 
 
 def robot_at(port, **more):

@@ -17,6 +17,7 @@ BUILT_IN = {
     "sim": "flatpush.execution.simulated:sim",
     "dry-run": "flatpush.execution.simulated:dry_run",
     "egm": "flatpush.execution.egm:egm",
+    "ur": "flatpush.execution.ur:ur",
     "mujoco": "flatpush.execution.cell.robot:mujoco",
 }
 

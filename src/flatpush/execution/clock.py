@@ -46,3 +46,36 @@ class SimulatedClock:
         if until > self._time:
             self._advance(until)
             self._time = until
+
+
+class Cycles(Protocol):
+    """A controller that tells its time with every message."""
+
+    time: float
+
+    def newest(self) -> None:
+        """Passes over what has come already."""
+        ...
+
+    def receive(self) -> None:
+        """Waits for the next message."""
+        ...
+
+
+class CycleClock:
+    """The controller's: it goes on only while messages come.
+
+    Args:
+        period: of the messages [s].
+    """
+
+    def __init__(self, controller: Cycles, period: float) -> None:
+        self._controller, self._period = controller, period
+
+    def now(self) -> float:
+        self._controller.newest()
+        return self._controller.time
+
+    def wait(self, until: float) -> None:
+        while self._controller.time < until - 0.5 * self._period:
+            self._controller.receive()

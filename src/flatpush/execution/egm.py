@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from ..errors import MissingExtra
-from ..geometry import compose, inverse, rotate
+from ..geometry import rotate
 from ..problem import Plan
 from .addresses import Address
+from .clock import CycleClock
+from .mount import TILT, in_base, on_table
 from .robot import Limits, RobotFault, State, Target
 
 if TYPE_CHECKING:
@@ -27,21 +29,6 @@ LIMITS = Limits(period=0.004, age=0.1, deviation=0.02)
 CONNECT = 5.0  # patience with a controller that does not send yet [s]
 SILENCE = 0.1  # patience with one that has sent, on the machine's clock [s]
 TURNOVER = 2**32  # of the controller's milliseconds
-
-
-class CycleClock:
-    """The controller's time, read from its messages."""
-
-    def __init__(self, robot: "EgmRobot") -> None:
-        self._robot = robot
-
-    def now(self) -> float:
-        self._robot.newest()
-        return self._robot.time
-
-    def wait(self, until: float) -> None:
-        while self._robot.time < until - 0.5 * LIMITS.period:
-            self._robot.receive()
 
 
 class EgmRobot:
@@ -70,9 +57,9 @@ class EgmRobot:
         silence: float = SILENCE,
     ) -> None:
         _load()
-        self.limits, self.clock, self.time = limits, CycleClock(self), 0.0
+        self.limits, self.clock, self.time = limits, CycleClock(self, LIMITS.period), 0.0
         self._host, self._port, self._connect, self._silence = host, port, connect, silence
-        self._frame, self._height = np.array([base[0], base[1], base[3]]), base[2]
+        self._base = base
         self._egm: EGM | None = None
         self._state: State | None = None
         self._begun: int | None = None
@@ -176,27 +163,25 @@ class EgmRobot:
         place, turn = found.cartesian
         # Rz(yaw) Rx(π) = (0, cos yaw/2, sin yaw/2, 0)
         yaw = 2 * math.atan2(turn[2], turn[1])
-        x, y, angle = compose(inverse(self._frame), [place[0] / 1000, place[1] / 1000, yaw])
         last = before.pose[3] if before is not None and np.isfinite(before.pose[3]) else 0.0
-        angle = last + math.remainder(angle - last, 2 * math.pi)
-        pose = np.array([x, y, place[2] / 1000 - self._height, angle])
+        pose = on_table(self._base, [v / 1000 for v in place], yaw, last)
         twist = np.zeros(4)
         if before is not None and self.time > before.stamp:
             twist = (pose - before.pose) / (self.time - before.stamp)
         fault = "" if found.motors_on else "the motors are off"
         fault = fault or ("" if found.rapid_running else "RAPID is not running")
-        if abs(turn[0]) + abs(turn[3]) > 0.01:
+        if abs(turn[0]) + abs(turn[3]) > TILT:
             fault = fault or "the tool does not point straight down"
         return State(pose, twist, self.time, fault)
 
     def _answer(self, target: Target) -> None:
         if self._egm is None:
             return
-        x, y, yaw = compose(self._frame, target.pose[[0, 1, 3]])
-        place = 1000 * np.array([x, y, target.pose[2] + self._height])
+        x, y, z, yaw = in_base(self._base, target.pose)
+        place = 1000 * np.array([x, y, z])
         turn = np.array([0.0, math.cos(yaw / 2), math.sin(yaw / 2), 0.0])
         speed = np.zeros(6)
-        speed[:2] = 1000 * rotate(self._frame[2], target.twist[:2])
+        speed[:2] = 1000 * rotate(self._base[3], target.twist[:2])
         speed[2], speed[5] = 1000 * target.twist[2], math.degrees(target.twist[3])
         self._egm.send_to_robot_cart(place, turn, speed)
         self._answered = True

@@ -423,7 +423,7 @@ def stream(
                 if told is not None:
                     told(cycle)
                 # A cycle that was late is not made up for: the next would come too soon.
-                due = max(due, now - 0.5 * period) + period
+                due = max(due, now - 0.25 * period) + period
         except RobotFault as fault:
             outcome = str(fault)
         finally:
