@@ -81,6 +81,7 @@ def shared(returns: object, *examples: object, fused: bool = False) -> Callable[
         returns, examples: a value of the type that it returns, and of that of each argument.
         fused: multiply and add at once.
     """
+    _learn_formulas()
 
     def decorated(function: F) -> F:
         signature = nb.typeof(returns)(*(nb.typeof(example) for example in examples))

@@ -258,7 +258,7 @@ def test_the_loops_are_vectorised():
     here, law = Frame(0.0, 0.0, 1.0, 0.0, 0.0), Law(1.0, 1.0, 1.0, 1.0)
     scratch = kernels.Bounds(0, 1, 0, 8), kernels.Tiles.new(), table
     for kernel, arguments in (
-        (kernels.dubins_lengths, (poses, poses, 1.0, *scratch)),
+        (kernels.dubins_costs, (poses, poses, here, kernels.Round(1.0), *scratch)),
         (kernels.three_twist_costs, (poses, poses, here, Weighted(1.0, 1.0, 0.0, 1.0, 1.0, 1.0), *scratch)),
         (kernels.timed_costs, (poses, poses, here, Timed(1.0, 1.0, 0.0, law, law, law), *scratch)),
     ):

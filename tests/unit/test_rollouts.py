@@ -12,11 +12,12 @@ from flatpush.control.laws.gains import Gains
 from flatpush.control.laws.linearisation import TrackingController
 from flatpush.control.laws.many_runs import OUTCOMES, closed_loops
 from flatpush.control.laws.path_following import PathController
-from flatpush.control.laws.reference import PathReference, Ramps
+from flatpush.control.laws.reference import PathReference
 from flatpush.control.laws.rollout import Loop, PointPush, rollout
 from flatpush.control.loop.closed_loop import limits_used
 from flatpush.control.loop.limits import HandLimits, Limits
 from flatpush.geometry import transform
+from flatpush.steering.time_law import Trapezoid
 
 TILTED = np.array([[1.0719, -0.0177, -0.1782], [-0.0177, 1.0417, 0.1599], [-0.1782, 0.1599, 1.5104]])
 TILTED = TILTED / np.outer([1, 1, UNIT], [1, 1, UNIT])
@@ -111,7 +112,10 @@ def test_a_contact_that_leaves_its_edge_and_bad_numbers():
         args = {"normal": [0, 1], "starts": starts, "surfaces": NOMINAL, "duration": 1.0, **change}
         with pytest.raises(fp.InputError):
             closed_loops(controller, **args)
-    timed = replace(controller.reference, laws=(Ramps(0.04, 0.001, 0.02, 0.1), Ramps(0.1, 0.001, 0.02, 0.1)))
+    timed = replace(
+        controller.reference,
+        laws=(Trapezoid(0.04, 0.02, 0.1, slow=0.001), Trapezoid(0.1, 0.02, 0.1, slow=0.001)),
+    )
     with pytest.raises(fp.InputError, match="has time laws"):
         closed_loops(replace(controller, reference=timed), [0, 1], starts, NOMINAL, 1.0)
 

@@ -5,7 +5,7 @@ import pytest
 
 import flatpush as fp
 from flatpush.geometry import compose, exp, pose_error, transform
-from flatpush.planning.timing import Trapezoid
+from flatpush.steering.time_law import Trapezoid
 
 
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 0.3])
@@ -61,3 +61,18 @@ def test_a_hand_that_turns_with_the_object_turns_no_faster_than_it_may():
     law = Trapezoid.along(0.1, 0.005, 0.02, 1.0, turn_rate=1.0)
     t = np.linspace(0, law.duration, 20001)
     assert np.max(np.gradient(law.travelled(t), t)) / 0.005 == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("length", [1e-4, 5e-3, 0.3])
+def test_a_law_that_is_slow_at_its_ends_moves_as_it_says(length):
+    """Speed and length are integrals of what is below them, from `slow` to `slow`; motion and travelled agree."""
+    law = Trapezoid(length, 0.02, 0.1, slow=0.004)
+    t = np.linspace(0, law.duration, 4001)
+    s, v, a = np.array([law.motion(x) for x in t]).T
+    assert (v[0], v[-1]) == pytest.approx((0.004, 0.004))
+    assert np.max(v) == pytest.approx(law.top)
+    assert s == pytest.approx(law.travelled(t), abs=1e-15)
+    assert s[-1] == pytest.approx(length)
+    middles = 0.5 * (v[1:] + v[:-1])
+    assert np.diff(s) == pytest.approx(middles * np.diff(t), abs=0.1 * t[1] ** 2)
+    assert np.diff(v) == pytest.approx(0.5 * (a[1:] + a[:-1]) * np.diff(t), abs=0.1 * t[1])

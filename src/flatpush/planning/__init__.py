@@ -1,4 +1,4 @@
-"""From a scene to a plan: push points, one push or many, transits, timing."""
+"""From a scene to a plan: push points, one push or many, transits."""
 
 from .candidates import automatic_pushes
 from .controllability import controllability

@@ -8,10 +8,10 @@ from ..errors import FlatpushError
 from ..geometry.pose import Array
 from ..problem import Scene
 from ..steering.fleet import Fleet
+from ..steering.time_law import Trapezoid
 from .assembly import car_of
 from .options import PushOption
 from .segments import fingertips, tip_radii
-from .timing import Trapezoid
 from .transits import Transits
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..geometry import compose, exp
 from ..geometry.pose import Array
 from ..steering.fleet import Fleet
+from ..steering.time_law import rest_to_rest
 
 NOTHING = 1e-10  # an amount below this is nothing [rad, m]
 Piece = tuple[int, int, float]
@@ -68,8 +69,7 @@ class Path:
             if np.isinf(speed):
                 total += way
                 continue
-            up = self.fleet.accelerations[push, letter]
-            total += way / speed + speed / up if way * up >= speed**2 else 2 * np.sqrt(way / up)
+            total += rest_to_rest(way, speed, self.fleet.accelerations[push, letter])
         return float(total)
 
     def backwards(self, fleet: Fleet, start: Array) -> "Path":

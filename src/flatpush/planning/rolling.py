@@ -17,9 +17,9 @@ from ..geometry.pose import Array
 from ..problem import Arc, PushSegment, Scene
 from ..problem.mechanics import contact_at
 from ..steering.car import Car
+from ..steering.time_law import Trapezoid
 from .options import PushOption
 from .segments import SAG, SAG_ANGLE, ArcGeometry, fingertips
-from .timing import Trapezoid
 
 NODES, GAUSS, FINE = 17, 24, 400
 # The speed along the way is right to a few parts in 10⁵, so this much of the limits is used.

@@ -8,7 +8,7 @@ from ..geometry import compose, exp, transform
 from ..geometry.pose import Array
 from ..problem import Arc, Pusher, PushSegment, Scene
 from ..steering.car import Car
-from .timing import Trapezoid
+from ..steering.time_law import Trapezoid
 
 # Straight interpolation between samples stays within these [m, rad]: half of what the plan document promises.
 SAG, SAG_ANGLE = 2e-5, 4e-4

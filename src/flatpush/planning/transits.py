@@ -12,8 +12,8 @@ from ..errors import FlatpushError
 from ..geometry import Outline, compose, wrap_angle
 from ..geometry.pose import Array
 from ..problem import Pusher, Scene, TransitSegment
+from ..steering.time_law import Trapezoid
 from .segments import SAG, SAG_ANGLE
-from .timing import Trapezoid
 
 # On the table the fingers keep at least this distance from the object while they go around it [m].
 LEAST_GAP = 0.001

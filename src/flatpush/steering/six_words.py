@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..compiled import inner, kernel, shared
 from ..geometry.pose import Array
+from .time_law import rest_to_rest
 
 TURN = 2 * math.pi  # a full turn [rad]
 # How far a word may end from the goal, per length of the query; half of what three_twist.py grants, so that whatever
@@ -105,16 +106,6 @@ def price(car: Any, letter: int, amount: float) -> float:
     if speed == np.inf:
         return way
     return rest_to_rest(way, speed, car.acceleration[letter])
-
-
-@inner
-def rest_to_rest(way: float, speed: float, acceleration: float) -> float:
-    """Time [s] along a way [m] that starts and ends at rest: a trapezoid of speed, or a triangle where it is short."""
-    if way <= 0.0:
-        return 0.0
-    if way * acceleration >= speed * speed:
-        return way / speed + speed / acceleration
-    return 2.0 * math.sqrt(way / acceleration)
 
 
 @inner

@@ -1,6 +1,5 @@
 """Where the flat point of a push should be: the path of a plan, exactly, with its derivatives."""
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,8 +11,8 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ...geometry import compose, cross, exp, perpendicular, relative, rotate, transform, velocity_at
 from ...geometry.pose import Array
-from ...planning.timing import Trapezoid
 from ...problem import Arc, Pusher, PushSegment
+from ...steering.time_law import Trapezoid
 from .formulas import place
 from .steering_model import SteeringModel
 
@@ -30,55 +29,6 @@ class FlatState(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
-
-
-@dataclass(frozen=True)
-class Ramps:
-    """Speeding up from a slow speed, cruising and slowing down to it again, along a length [m], [m/s], [m/s²].
-
-    From rest to rest where it is 0. From piece to piece of a path the turn changes at once, and with it the velocity of
-    the fingertips; the slower that is, the less there is to be made up for.
-    """
-
-    length: float
-    slow: float
-    speed: float
-    acceleration: float
-
-    @property
-    def top(self) -> float:
-        """The highest speed that is reached."""
-        return min(self.speed, math.sqrt(self.slow**2 + self.acceleration * self.length))
-
-    @property
-    def ramp(self) -> float:
-        """Time of speeding up [s]."""
-        return (self.top - self.slow) / self.acceleration
-
-    @property
-    def duration(self) -> float:
-        rest = self.length - (self.top + self.slow) * self.ramp
-        return 2 * self.ramp + max(0.0, rest) / self.top
-
-    def run(self, time: float) -> tuple[float, float, float]:
-        """Length, speed and its rate at a time."""
-        T, r, a = self.duration, self.ramp, self.acceleration
-        t = min(max(time, 0.0), T)
-        left = T - t
-        if t < r:
-            return self.slow * t + 0.5 * a * t * t, self.slow + a * t, a
-        if left < r:
-            return self.length - self.slow * left - 0.5 * a * left * left, self.slow + a * left, -a
-        return (self.slow + 0.5 * a * r) * r + self.top * (t - r), self.top, 0.0
-
-    def speed_from(self, gone: float, dt: float) -> float:
-        """Mean speed over a tick that begins after a length; never 0 before the end."""
-        step = 0.5 * self.acceleration * dt
-        left = max(0.0, self.length - gone)
-        rising, falling = (
-            math.sqrt(self.slow**2 + 2 * self.acceleration * s) for s in (max(0.0, gone), left)
-        )
-        return min(self.speed, rising + step, max(falling - step, step, self.slow))
 
 
 class AbstractReference(ABC):
@@ -103,7 +53,7 @@ class PathReference(AbstractReference):
 
     table: Array
     speed: float
-    laws: tuple[Ramps, ...] = ()
+    laws: tuple[Trapezoid, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.speed) and self.speed > 0):
@@ -139,7 +89,7 @@ class PathReference(AbstractReference):
         while k + 1 < len(self.laws) and time > self.laws[k].duration:
             time -= self.laws[k].duration
             k += 1
-        length, speed, rate = self.laws[k].run(time)
+        length, speed, rate = self.laws[k].motion(time)
         return float(self.table[k, 0]) + length, speed, rate
 
     def speed_from(self, length: float, dt: float) -> float:
@@ -177,7 +127,7 @@ class PathReference(AbstractReference):
         """
         X = np.asarray(segment.object[0], dtype=float)
         rows: list[list[float]] = []
-        laws: list[Ramps] = []
+        laws: list[Trapezoid] = []
         done = 0.0
         tips = transform(relative(segment.object[0], segment.pusher[0]), segment.fingers)
         for arc in segment.arcs:
@@ -208,7 +158,7 @@ class PathReference(AbstractReference):
         return cls(np.array(rows), speed, tuple(laws))
 
 
-def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Ramps:
+def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Trapezoid:
     """The planner's time law of an arc, for the fastest of the fingertips (k, 2) in O, in the flat point's lengths."""
     fastest = float(np.max(np.hypot(*velocity_at(arc.twist, tips).T)))
     turn = abs(float(arc.twist[2]))
@@ -217,7 +167,7 @@ def _law(length: float, arc: Arc, tips: Array, pusher: Pusher) -> Ramps:
         pusher.turn_rate,
     )  # fmt: skip
     share = length / law.length
-    return Ramps(length, 0.0, share * law.speed, share * law.acceleration)
+    return Trapezoid(length, share * law.speed, share * law.acceleration)
 
 
 def check_reference(reference: AbstractReference, most: float = np.inf) -> None:

@@ -23,6 +23,7 @@ import numpy as np
 from ...compiled import inner, kernel, shared
 from ...geometry.pose import Array
 from ...steering.six_words import CAR, LEFT, STRAIGHT, TURN, WORD, Records
+from ...steering.time_law import rest_to_rest
 
 MOST = 48  # arcs of a chain
 BOTTOM = 1e-13  # an amount below this is nothing [m]
@@ -141,16 +142,11 @@ def _cost(arcs: Records, n: int) -> float:
         if speed == np.inf:
             total += way
             arc.gradient = arc.rate
-        elif way * arc.acceleration >= speed * speed:
-            total += way / speed + speed / arc.acceleration
-            arc.gradient = arc.rate / speed
         else:
-            root = math.sqrt(way / arc.acceleration)
-            total += 2.0 * root
-            stiff = STIFF * arc.rate / speed
-            arc.gradient = (
-                stiff if root * arc.acceleration * STIFF < speed else arc.rate / (root * arc.acceleration)
-            )
+            total += rest_to_rest(way, speed, arc.acceleration)
+            peak = min(speed, math.sqrt(way * arc.acceleration))
+            # The time of a short way begins like a root; its slope is kept within STIFF of that at full speed.
+            arc.gradient = arc.rate / max(peak, speed / STIFF)
     return total
 
 

@@ -38,14 +38,17 @@ def dubins_lengths(starts: ArrayLike, goals: ArrayLike, radius: float, threads: 
     >>> dubins_lengths([[0, 0, 0], [1, 0, 0]], [3, 0, 0], 1.0).round(9).tolist()
     [3.0, 2.0]
     """
-    from .kernels import dubins_lengths as fill
+    from .kernels import HERE, Round, dubins_costs
 
-    radius = checked_radius(radius)
+    car = Round(checked_radius(radius))
     shape, table, X, Y = _pairs(starts, goals)
     lengths = np.empty(table)
     if lengths.size:
         _share(
-            lambda bounds, tiles: fill(X, Y, radius, bounds, tiles, lengths), table, threads, (starts, goals)
+            lambda bounds, tiles: dubins_costs(X, Y, HERE, car, bounds, tiles, lengths),
+            table,
+            threads,
+            (starts, goals),
         )
     return lengths.reshape(shape)
 

@@ -1,6 +1,7 @@
 """Costs of many pairs of poses, in tiles that stay in the first cache; __init__.py is the way in."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,6 +13,15 @@ from ..vectors.kernels import TURN, _heading, _select, _widest_vectors
 TILE = 504  # frames and lengths stay in the first cache; rows of 4096 bytes would compete for the same lines of it
 X, Y, COS, SIN, HEADING = range(5)  # rows of a tile of frames
 HERE = Frame(0.0, 0.0, 1.0, 0.0, 0.0)
+
+
+class Round(NamedTuple):
+    """A Dubins car by its turning radius [m]."""
+
+    radius: float
+
+
+CarT = TypeVar("CarT", Round, Weighted, Timed)
 
 
 class Bounds(NamedTuple):
@@ -92,68 +102,41 @@ def _load(
     return finite
 
 
-@kernel(fused=True, lent=True)
-def dubins_lengths(
-    starts: Array, goals: Array, radius: float, bounds: Bounds, tiles: Tiles, out: Array
-) -> bool:
-    """Fills some rows and columns of lengths (n, m) [m].
+def _filler(cost: Callable[[Frame, Frame, CarT], float]) -> Callable[..., bool]:
+    """The kernel that fills a table with what a block costs between a start at the origin and a goal, in radii."""
 
-    starts and goals have shapes (n or 1, m or 1, 3). What a length comes out as does not depend on the bounds. Returns
-    whether poses look finite.
-    """
-    _widest_vectors()
-    (a, b, row_out), finite = tiles, True
-    scale = 1.0 / radius
-    for begin in range(bounds.left, bounds.right, TILE):
-        count = min(TILE, bounds.right - begin)
-        for row in range(bounds.low, bounds.high):
-            finite &= _load(starts, goals, row, row == bounds.low, begin, count, HERE, a, b)
-            for i in range((count + 7) // 8 * 8):  # whole vectors only
-                start = Frame(0.0, 0.0, a[COS, i], a[SIN, i], a[HEADING, i])
-                x, y = (b[X, i] - a[X, i]) * scale, (b[Y, i] - a[Y, i]) * scale
-                row_out[i] = radius * dubins_between(start, Frame(x, y, b[COS, i], b[SIN, i], b[HEADING, i]))
-            for i in range(count):
-                out[row, begin + i] = row_out[i]
-    return finite
+    @kernel(fused=True, lent=True)
+    def fill(
+        starts: Array, goals: Array, axle: Frame, car: CarT, bounds: Bounds, tiles: Tiles, out: Array
+    ) -> bool:
+        """Fills some rows and columns of costs (n, m) of a car with an axle.
 
+        starts and goals have shapes (n or 1, m or 1, 3). What a cost comes out as does not depend on the bounds.
+        Returns whether poses look finite.
+        """
+        _widest_vectors()
+        (a, b, row_out), finite = tiles, True
+        scale = 1.0 / car.radius
+        for begin in range(bounds.left, bounds.right, TILE):
+            count = min(TILE, bounds.right - begin)
+            for row in range(bounds.low, bounds.high):
+                finite &= _load(starts, goals, row, row == bounds.low, begin, count, axle, a, b)
+                for i in range((count + 7) // 8 * 8):  # whole vectors only
+                    start = Frame(0.0, 0.0, a[COS, i], a[SIN, i], a[HEADING, i])
+                    x, y = (b[X, i] - a[X, i]) * scale, (b[Y, i] - a[Y, i]) * scale
+                    row_out[i] = cost(start, Frame(x, y, b[COS, i], b[SIN, i], b[HEADING, i]), car)
+                for i in range(count):
+                    out[row, begin + i] = row_out[i]
+        return finite
 
-@kernel(fused=True, lent=True)
-def three_twist_costs(
-    starts: Array, goals: Array, axle: Frame, car: Weighted, bounds: Bounds, tiles: Tiles, out: Array
-) -> bool:
-    """As dubins_lengths for a car of three_twist_between, as __init__.weighted_car gives it."""
-    _widest_vectors()
-    (a, b, row_out), finite = tiles, True
-    scale = 1.0 / car.radius
-    for begin in range(bounds.left, bounds.right, TILE):
-        count = min(TILE, bounds.right - begin)
-        for row in range(bounds.low, bounds.high):
-            finite &= _load(starts, goals, row, row == bounds.low, begin, count, axle, a, b)
-            for i in range((count + 7) // 8 * 8):  # whole vectors only
-                start = Frame(0.0, 0.0, a[COS, i], a[SIN, i], a[HEADING, i])
-                x, y = (b[X, i] - a[X, i]) * scale, (b[Y, i] - a[Y, i]) * scale
-                row_out[i] = three_twist_between(start, Frame(x, y, b[COS, i], b[SIN, i], b[HEADING, i]), car)
-            for i in range(count):
-                out[row, begin + i] = row_out[i]
-    return finite
+    return fill
 
 
-@kernel(fused=True, lent=True)
-def timed_costs(
-    starts: Array, goals: Array, axle: Frame, car: Timed, bounds: Bounds, tiles: Tiles, out: Array
-) -> bool:
-    """As three_twist_costs for timed_between."""
-    _widest_vectors()
-    (a, b, row_out), finite = tiles, True
-    scale = 1.0 / car.radius
-    for begin in range(bounds.left, bounds.right, TILE):
-        count = min(TILE, bounds.right - begin)
-        for row in range(bounds.low, bounds.high):
-            finite &= _load(starts, goals, row, row == bounds.low, begin, count, axle, a, b)
-            for i in range((count + 7) // 8 * 8):  # whole vectors only
-                start = Frame(0.0, 0.0, a[COS, i], a[SIN, i], a[HEADING, i])
-                x, y = (b[X, i] - a[X, i]) * scale, (b[Y, i] - a[Y, i]) * scale
-                row_out[i] = timed_between(start, Frame(x, y, b[COS, i], b[SIN, i], b[HEADING, i]), car)
-            for i in range(count):
-                out[row, begin + i] = row_out[i]
-    return finite
+@block
+def _dubins(start: Frame, goal: Frame, car: Round) -> float:
+    return car.radius * dubins_between(start, goal)
+
+
+dubins_costs = _filler(_dubins)
+three_twist_costs = _filler(three_twist_between)
+timed_costs = _filler(timed_between)
