@@ -25,7 +25,7 @@ from flatpush.control.tracking.plan_controller import goal_error
 from flatpush.control.tracking.simulated_run import TrackedRun
 
 EXAMPLES = (
-    "butterfly", "l_shape", "maze", "rectangle_boundary", "rectangle_three_feet", "t_shape", "triangle",
+    "butterfly", "disc", "l_shape", "maze", "rectangle_boundary", "rectangle_three_feet", "t_shape", "triangle",
     "triangle_one_finger",
 )  # fmt: skip
 RATES = (15, 30, 60, 120, 500)

@@ -185,6 +185,40 @@ def test_bad_usage_is_one_message_and_status_2(folder, monkeypatch, capsys, argu
     assert sorted(p.name for p in folder.iterdir()) == ["scene.yaml"]
 
 
+def test_nothing_takes_the_place_of_what_a_plan_was_read_from(folder, monkeypatch, capsys):
+    """Of a plan in another folder, which says where its scene and the drawing in it are."""
+    monkeypatch.chdir(folder)
+    Path("part.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><rect width="50" height="35"/></svg>'
+    )
+    scene = SCENE.replace("[[25, -17.5], [25, 17.5], [-25, 17.5], [-25, -17.5]]", "{file: part.svg}")
+    Path("scene.yaml").write_text(scene)
+    Path("robot.csv").symlink_to("scene.yaml")
+    Path("plans").mkdir()
+    before = {name: Path(name).read_text() for name in ("scene.yaml", "part.svg")}
+
+    def status(*arguments):
+        monkeypatch.setattr(sys, "argv", ["flatpush", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, capsys.readouterr().err
+
+    assert status("plan", "scene.yaml", "-o", "plans/plan.json")[0] == 0
+    for arguments, what in (
+        (("plan", "scene.yaml", "-o", "same.svg", "--figure", "same.svg"), "another output"),
+        (("plan", "scene.yaml", "-o", "part.svg"), "an input"),
+        (("simulate", "plans/plan.json", "-o", "scene.yaml"), "an input"),
+        (("simulate", "plans/plan.json", "--figure", "part.svg"), "an input"),
+        (("track", "plans/plan.json", "--figure", "part.svg"), "an input"),
+        (("export", "plans/plan.json", "robot.csv"), "an input"),
+        (("run", "plans/plan.json", "--robot", "sim", "--figure", "part.svg"), "an input"),
+    ):
+        code, said = status(*arguments)
+        assert (code, f"this file is {what}" in said) == (2, True), (arguments, said)
+    assert before == {name: Path(name).read_text() for name in before}
+    assert not Path("same.svg").exists()
+
+
 def test_a_full_disk_leaves_no_file(folder):
     """A device that is always full stands for the disk."""
     if not Path("/dev/full").exists():

@@ -159,6 +159,12 @@ def test_a_push_of_one_sample_is_refused(plan):
         PlanController.of(replace(plan[0], segments=segments))
 
 
+@pytest.mark.parametrize("law", ["path", "dfl", "horizon"])
+def test_a_plan_without_pushes_is_refused(plan, law):
+    with pytest.raises(fp.InputError, match="no push to follow"):
+        TrackedRun(law).of(replace(plan[0], segments=()))
+
+
 def used(plan, run):
     return limits_used(run, Limits.of(plan.scene.pusher, plan.pushes[0].fingers))
 

@@ -269,6 +269,14 @@ def test_a_scene_tells_which_files_it_refers_to(tmp_path: Path) -> None:
     document["object"]["surface"] = {"file": "surface.json"}
     path.write_text(yaml.safe_dump(document))
     assert scene_files(path) == (path, FOLDER / "use.svg", tmp_path / "surface.json")
+    from flatpush.documents import as_read, plan_files
+
+    (tmp_path / "plans").mkdir()
+    plan = tmp_path / "plans" / "plan.json"
+    run = {"read": as_read(path, plan)}
+    assert run["read"][2] == "../surface.json"
+    assert [file.resolve() for file in plan_files(plan, run)] == [plan, *map(Path.resolve, scene_files(path))]
+    assert plan_files(plan, {}) == plan_files(plan, {"read": "scene.yaml"}) == (plan,)
 
 
 @pytest.mark.parametrize("target", ["part.svg", "scene.yaml", "again.svg"])

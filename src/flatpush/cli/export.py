@@ -21,7 +21,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> int:
     """Verify PLAN and write the pusher's timed poses as CSV: t [s], x, y, z [m], yaw [rad], segment."""
-    from ..documents import check_outputs, export_csv, load_plan
+    from ..documents import check_outputs, export_csv, load_plan, plan_files
     from ..simulation import verify
 
     if file.suffix.lower() != ".csv":
@@ -29,8 +29,8 @@ def command(
 
         raise InputError("export writes a .csv file", value=str(file))
     frame = numbers(base_frame, 4, "--base-frame")
-    check_outputs([plan], [file])
     loaded = load_plan(plan)
+    check_outputs(plan_files(plan, loaded.run), [file])
     failed = verify(loaded).failed if loaded.status == "solved" else ()
     tell_failed(failed)
     if failed and not unverified:

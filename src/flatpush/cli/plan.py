@@ -4,6 +4,7 @@ import math
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -54,7 +55,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
-    from ..documents import check_outputs, load_scene, plan_document, save_plan, scene_files
+    from ..documents import as_read, check_outputs, load_scene, plan_document, save_plan, scene_files
     from ..simulation import verify
 
     overrides: dict[str, Any] = {
@@ -97,7 +98,7 @@ def command(
         typer.echo("the plan fails its own verification; nothing was written", err=True)
         return 4
     if output is not None:
-        save_plan(found, output)
+        save_plan(replace(found, run={**found.run, "read": as_read(scene, output)}), output)
     if figure is not None:
         from ..view import save_figure
 

@@ -50,7 +50,7 @@ def command(
     """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C stops the robot."""
     from ..control import ARRIVED
     from ..control.tracking.plan_controller import goal_error
-    from ..documents import check_outputs, load_plan, load_scene, scene_files
+    from ..documents import check_outputs, load_plan, load_scene, plan_files, scene_files
     from ..execution import DONE, open_robot, run
     from ..execution.log import check_log
     from ..execution.run import to_controller, way
@@ -61,14 +61,15 @@ def command(
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
     frame = numbers(base_frame, 4, "--base-frame")
-    check_outputs([plan, *(() if scene is None else scene_files(scene))], [log, figure])
+    loaded = load_plan(plan)
+    inputs = *plan_files(plan, loaded.run), *(() if scene is None else scene_files(scene))
+    check_outputs(inputs, [log, figure])
     if log is not None:
         check_log(log)
     if figure is not None:
         from ..view.picture import check_ending
 
         check_ending(figure)
-    loaded = load_plan(plan)
     failed = (
         verify(loaded, None if scene is None else load_scene(scene)).failed
         if loaded.status == "solved"

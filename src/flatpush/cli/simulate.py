@@ -47,7 +47,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Roll PLAN out in the quasi-static contact simulator."""
-    from ..documents import check_outputs, load_plan
+    from ..documents import check_outputs, load_plan, plan_files
     from ..problem.scene import MODELS
 
     if runs < 1:
@@ -60,7 +60,7 @@ def command(
         raise InputError("--source is arcs or samples", value=source)
     noise = _noise(position, angle, friction, friction_range, df, centre, loads, model)
     loaded = load_plan(plan)
-    check_outputs([plan], [output, figure])
+    check_outputs(plan_files(plan, loaded.run), [output, figure])
     warn_unverified(loaded)
     if figure is not None:
         from ..view.figure import ENDINGS

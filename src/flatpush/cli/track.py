@@ -52,7 +52,7 @@ def command(
     from ..control import ARRIVED, Camera
     from ..control.tracking.plan_controller import goal_error
     from ..control.tracking.simulated_run import TrackedRun
-    from ..documents import check_outputs, load_plan
+    from ..documents import check_outputs, load_plan, plan_files
 
     if controller not in CONTROLLERS:
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
@@ -83,12 +83,12 @@ def command(
         None if within is None else (within[0] / 1000, math.radians(within[1])),
     )
     loaded = load_plan(plan)
-    warn_unverified(loaded)
     if figure is not None:
         from ..view.picture import check_ending
 
-        check_outputs([plan], [figure])
+        check_outputs(plan_files(plan, loaded.run), [figure])
         check_ending(figure)
+    warn_unverified(loaded)
     run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .atomic import check_outputs, check_writable, write_atomically
     from .export import export_csv
-    from .outline_reader import OutlineNote, outline_note, scene_files
+    from .files_read import as_read, plan_files, scene_files
+    from .outline_reader import OutlineNote, outline_note
     from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import read_mapping
@@ -28,6 +29,7 @@ __all__ = [
     "PairsFile",
     "RobotLog",
     "RobotRun",
+    "as_read",
     "check_outputs",
     "check_writable",
     "export_csv",
@@ -40,6 +42,7 @@ __all__ = [
     "parse_plan",
     "parse_scene",
     "plan_document",
+    "plan_files",
     "plan_schema",
     "read_mapping",
     "save_plan",
@@ -78,7 +81,9 @@ _HOME = {
     "save_runs": "runs_file",
     "save_surface": "surface_file",
     "scene_document": "scene_writer",
-    "scene_files": "outline_reader",
+    "as_read": "files_read",
+    "plan_files": "files_read",
+    "scene_files": "files_read",
     "scene_schema": "schema",
     "scene_template": "template",
     "write_atomically": "atomic",

@@ -1,9 +1,7 @@
 """Reads the outline of a scene from the drawing that it names, and tells what was read."""
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -110,28 +108,6 @@ def outline_note(path: str | os.PathLike[str]) -> OutlineNote | None:
                 f" ({x:.9g}, {y:.9g}) {ctx.length_unit}"
             )
     return OutlineNote(tuple(lines), drawn) if lines else None
-
-
-def scene_files(path: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """The scene file and all files that it refers to, which no output may overwrite.
-
-    Raises:
-        InputError: if the scene file cannot be read.
-    """
-    found = [Path(path)]
-
-    def visit(value: object) -> None:
-        if isinstance(value, Mapping):
-            for key, item in value.items():
-                if key == "file" and isinstance(item, str):
-                    found.append(Path(path).parent / item)
-                visit(item)
-        elif isinstance(value, list):
-            for item in value:
-                visit(item)
-
-    visit(read_mapping(path))
-    return tuple(found)
 
 
 def _told(drawn: DrawnOutline, ctx: Context) -> list[str]:

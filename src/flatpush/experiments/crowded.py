@@ -152,7 +152,7 @@ def run(figures: pathlib.Path | None) -> str:
         if plan.certificate is None:
             rows.append(f"{name:<16} {count:9d}  {plan.reason}")
             continue
-        first = 1e3 * float(plan.run["first_path_time"] or 0.0)
+        first = 1e3 * float(str(plan.run["first_path_time"] or 0.0))
         rows.append(
             f"{name:<16} {count:9d}  {first:7.1f} ms  {plan.cost:.3f} m"
             f"  {1e3 * (plan.certificate.clearance or 0.0):.2f} mm"

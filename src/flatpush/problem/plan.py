@@ -83,7 +83,8 @@ class Plan:
         certificate: what was proved or measured; None without a plan.
         reason: why there is no plan, and what to try.
         scene_digest: of the scene it was saved with, see documents.scene_digest; empty before that and in older plans.
-        run: version and planning time [s]; not part of what two plans are compared by.
+        run: version, planning time [s] and, in a file, what the scene was read from ("read"); not part of what two
+            plans are compared by.
     """
 
     status: Literal["solved", "no_plan"]
@@ -94,7 +95,7 @@ class Plan:
     certificate: Certificate | None = None
     reason: str = ""
     scene_digest: str = ""
-    run: Mapping[str, float | str | None] = field(default_factory=dict)
+    run: Mapping[str, float | str | list[str] | None] = field(default_factory=dict)
 
     @property
     def pushes(self) -> tuple[PushSegment, ...]:

@@ -124,8 +124,7 @@ class PlanController(AbstractController[PlanState]):
         Raises:
             InputError: for a plan without pushes, a push without motion, and as the laws do.
         """
-        if plan.status != "solved" or not plan.pushes:
-            raise InputError("there is no push to follow in this plan", hint="It has none, or is not solved.")
+        check_pushes(plan)
         scene, first = plan.scene, plan.pushes[0]
         limits = Limits.of(scene.pusher, first.fingers, scene.object.outline.size)
         goal = scene.planning.goal_tolerance
@@ -268,6 +267,12 @@ class PlanController(AbstractController[PlanState]):
 
     def _model(self, push: int) -> SteeringModel:
         return self.inner[push].model
+
+
+def check_pushes(plan: Plan) -> None:
+    """Refuses a plan without a push (InputError)."""
+    if plan.status != "solved" or not plan.pushes:
+        raise InputError("there is no push to follow in this plan", hint="It has none, or is not solved.")
 
 
 def _model(scene: Scene, option: PushOption) -> SteeringModel:

@@ -16,7 +16,7 @@ from ..laws.gains import Gains
 from ..loop.closed_loop import ClosedLoopRun, drive
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.sensor import Camera, SimulatedSensor
-from .plan_controller import BESIDE, PlanController, beside, goal_error
+from .plan_controller import BESIDE, PlanController, beside, check_pushes, goal_error
 
 Law = Literal["path", "dfl", "horizon"]
 Timing = Literal["even", "plan"]
@@ -56,6 +56,7 @@ class TrackedRun:
         Raises:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
+        check_pushes(plan)
         law = self.law(plan)
         scene, first = plan.scene, plan.pushes[0]
         if any(p.fingers.shape != first.fingers.shape for p in plan.pushes):
