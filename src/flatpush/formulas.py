@@ -4,10 +4,23 @@ Nothing here needs a compiler; flatpush.compiled hands it what is collected here
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+if TYPE_CHECKING:
+
+    class Record:
+        """One record of an array with named columns, which numpy's own types do not know."""
+
+        def __getattr__(self, name: str) -> Any: ...
+        def __setattr__(self, name: str, value: Any) -> None: ...
+
+else:
+    Record = np.void
 
 FORMULAS: list[Callable[..., object]] = []
 CHOICES: list[tuple[Callable[..., object], Mapping[object, Callable[..., object]]]] = []

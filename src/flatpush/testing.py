@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .execution import Clock, Limits, OutOfLimits, Robot, RobotFault, Run, State, WallClock
+from .execution import Clock, Limits, OutOfLimits, Robot, RobotFault, Run, State, Target, WallClock
 from .execution.course import Course
 from .execution.run import DONE, Cycle, Played, ready, stream
 from .geometry.pose import Array
@@ -225,7 +225,7 @@ class _Between:
             found = self.kept or found
         return replace(found, fault=self.fault) if wrong and self.fault else found
 
-    def send(self, target: Any) -> Any:
+    def send(self, target: Target) -> Target:
         self.sent += 1
         return self.robot.send(target)
 

@@ -2,18 +2,21 @@
 
 import asyncio
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FlatpushError, InputError, MissingExtra
+
+if TYPE_CHECKING:
+    from ..simulation.study import Chunk, Runs, Spread
 
 PATIENCE = 8.0  # [s] for a scheduler to find workers
 ANSWER = 1.0  # [s] for it to say who it is
 
 
 @contextmanager
-def cluster(scheduler: str | None) -> Iterator[Any]:
+def cluster(scheduler: str | None) -> Iterator["Spread"]:
     """A function like map whose calls run on the workers of the scheduler at an address, or of a local cluster.
 
     Raises:
@@ -85,8 +88,8 @@ async def _ask(scheduler: str) -> None:
         raise ValueError("what answers is no scheduler")
 
 
-def _mapper(client: Any) -> Any:
-    def spread(function: Any, chunks: Any) -> list[Any]:
+def _mapper(client: Any) -> "Spread":
+    def spread(function: Callable[["Chunk"], "Runs"], chunks: Sequence["Chunk"]) -> list["Runs"]:
         futures = client.map(function, chunks, pure=False)
         try:
             return list(client.gather(futures))

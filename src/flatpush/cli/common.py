@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import typer
 
@@ -14,6 +14,7 @@ from .. import compiling
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..geometry.pose import Array
     from ..problem import Plan
     from ..simulation import Claim
 
@@ -39,7 +40,7 @@ def numbers(text: str | None, count: int, option: str) -> list[float] | None:
     return values
 
 
-def pose_text(pose: Any) -> str:
+def pose_text(pose: "Array | Sequence[float]") -> str:
     """A pose in mm and degrees, the angle within half a turn, or any."""
     turn = 0.0 if math.isnan(pose[2]) else math.remainder(math.degrees(pose[2]), 360)
     x, y, angle = (round(value, 2) + 0.0 for value in (1000 * pose[0], 1000 * pose[1], turn))
@@ -88,7 +89,7 @@ def warn_unverified(plan: "Plan") -> None:
         typer.echo(f"warning: this plan fails verification ({names}); see flatpush verify", err=True)
 
 
-def print_json(value: Any) -> None:
+def print_json(value: object) -> None:
     typer.echo(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
 
 

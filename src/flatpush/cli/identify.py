@@ -127,7 +127,7 @@ class _Found:
         self.model = better if model == "auto" else model
         self.surface = self.fits[self.model]
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         from ..documents.surface_file import surface_form
         from ..view.angle_table import angle_numbers
 

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array
@@ -33,12 +34,12 @@ def save_plan(plan: Plan, path: str | os.PathLike[str]) -> None:
     write_atomically(path, as_text(plan_document(plan)))
 
 
-def plan_document(plan: Plan) -> dict[str, Any]:
+def plan_document(plan: Plan) -> dict[str, object]:
     """The plan as a mapping of plain values in SI.
 
     In the certificate and in run, what is not finite stands as None; elsewhere it is refused.
     """
-    document: dict[str, Any] = {"flatpush": "plan/1", "status": plan.status}
+    document: dict[str, object] = {"flatpush": "plan/1", "status": plan.status}
     if plan.reason:
         document["reason"] = plan.reason
     return document | {
@@ -62,7 +63,7 @@ def load_plan(path: str | os.PathLike[str]) -> Plan:
     return parse_plan(read_mapping(path, MOST_BYTES, MOST_BYTES), os.fspath(path))
 
 
-def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:
+def parse_plan(document: Mapping[str, object], source: str = "") -> Plan:
     """The plan in a mapping that is laid out like a plan document.
 
     Raises:
@@ -97,12 +98,12 @@ def parse_plan(document: Mapping[str, Any], source: str = "") -> Plan:
     )
 
 
-def as_text(document: dict[str, Any]) -> str:
+def as_text(document: Mapping[str, object]) -> str:
     """A document as JSON, with one line for each list of numbers."""
     return _lines(document, "") + "\n"
 
 
-def finite_list(values: Any, key: str) -> list[Any]:
+def finite_list(values: ArrayLike, key: str) -> list[object]:
     """The array as nested lists; refuses what is not finite."""
     array: Array = np.asarray(values, dtype=float)
     if not np.isfinite(array).all():
@@ -131,7 +132,7 @@ def _segment(segment: PushSegment | TransitSegment, key: str) -> dict[str, Any]:
     }
 
 
-def _lists(segment: Any, key: str, *names: str) -> dict[str, list[Any]]:
+def _lists(segment: Any, key: str, *names: str) -> dict[str, list[object]]:
     return {name: finite_list(getattr(segment, name), join(key, name)) for name in names}
 
 

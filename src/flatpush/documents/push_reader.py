@@ -1,7 +1,5 @@
 """Reads the places to push at."""
 
-from typing import Any
-
 import numpy as np
 
 from ..geometry import Outline, OutlinePoint
@@ -15,7 +13,9 @@ from .reading import join
 OFF_OUTLINE = 0.01
 
 
-def read_pushes(ctx: Context, parts: list[Any], outline: Outline, pusher: Pusher) -> tuple[Push, ...]:
+def read_pushes(
+    ctx: Context, parts: list[m.PushAtPart | m.PushEdgePart], outline: Outline, pusher: Pusher
+) -> tuple[Push, ...]:
     """The pushes of a scene, with the pusher's fingers where they have none of their own."""
     result: list[Push] = []
     for i, part in enumerate(parts):
@@ -24,8 +24,9 @@ def read_pushes(ctx: Context, parts: list[Any], outline: Outline, pusher: Pusher
         if name in [push.name for push in result]:
             hint = "Give each push a name of its own."
             raise ctx.refuse("two pushes have this name", join(key, "name"), value=name, hint=hint)
-        point = _push_at(ctx, part.at, outline, key) if isinstance(part, m.PushAtPart) else None
-        if point is None:
+        if isinstance(part, m.PushAtPart):
+            point = _push_at(ctx, part.at, outline, key)
+        else:
             point = _push_on_edge(ctx, part.edge, part.along, outline, key)
         fingers = pusher.fingers if part.fingers is None else part.fingers
         spacing = pusher.spacing if part.spacing is None else part.spacing / ctx.per_metre

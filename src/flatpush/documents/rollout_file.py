@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Sequence
-from typing import Any
 
 from ..problem import Rollout
 from .atomic import write_atomically
@@ -21,7 +20,7 @@ def save_rollouts(rollouts: Sequence[Rollout], path: str | os.PathLike[str]) -> 
     write_atomically(path, as_text(document))
 
 
-def rollout_document(rollout: Rollout) -> dict[str, Any]:
+def rollout_document(rollout: Rollout) -> dict[str, object]:
     """The rollout as a mapping of plain values in SI."""
     arrays = ("final_pose", "times", "object", "pusher")
     return {

@@ -39,7 +39,8 @@ def scene_differences(found: Scene, wanted: Scene) -> list[SceneDifference]:
     How long and with what seed a plan is sought says nothing of the plan and is not compared. Where the wanted scene
     leaves the pushes to the planner ("auto"), any places are right, with the fingers and the spacing of its pusher.
     """
-    a, b = scene_document(found), scene_document(wanted)
+    a: dict[str, Any] = scene_document(found)
+    b: dict[str, Any] = scene_document(wanted)
     if b["pushes"] == "auto" and a["pushes"] != "auto":
         spacing = wanted.pusher.spacing if wanted.pusher.fingers == 2 else 0.0
         b["pushes"] = [{**p, "fingers": wanted.pusher.fingers, "spacing": spacing} for p in a["pushes"]]

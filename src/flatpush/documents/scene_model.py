@@ -36,13 +36,13 @@ class Part(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_unknown_keys(cls, data: Any) -> Any:
+    def _refuse_unknown_keys(cls, data: object) -> object:
         if isinstance(data, dict):
             refuse_unknown(data, list(cls.model_fields))
         return data
 
 
-def refuse_unknown(data: dict[str, Any], known: list[str]) -> None:
+def refuse_unknown(data: dict[str, object], known: list[str]) -> None:
     for key in data:
         if key not in known:
             raise PydanticCustomError("unknown_key", "unknown key", {"key": key, "known": known})
@@ -55,7 +55,7 @@ def forms(
     word: bool = False,
     listed: str = "",
     others: tuple[str, ...] = (),
-) -> tuple[Any, ...]:
+) -> tuple[Discriminator, BeforeValidator]:
     """What tells apart the forms that a value may take: a word, a list, or a mapping by the keys that it has.
 
     The tags stand in angle brackets, so that the path of an error is readable once they are removed.
@@ -70,7 +70,7 @@ def forms(
     keys = [key for group in groups for key in group]
     accepted = (BaseModel, *([str] if word else []), *([list] if listed else []))
 
-    def form(value: Any) -> str:
+    def form(value: str | list[object] | dict[str, object] | BaseModel) -> str:
         if isinstance(value, str):
             return "<word>"
         if isinstance(value, list):
@@ -78,7 +78,7 @@ def forms(
         given = value if isinstance(value, dict) else value.model_dump(exclude_unset=True)
         return next(f"<{group[0]}>" for group in groups if any(key in given for key in group))
 
-    def check(value: Any) -> Any:
+    def check(value: object) -> object:
         if isinstance(value, dict):
             held = [group for group in groups if any(key in value for key in group)]
             if len(held) > 1:

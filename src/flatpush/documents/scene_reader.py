@@ -28,7 +28,7 @@ LENGTHS = (
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
 
 
-def load_scene(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Scene:
+def load_scene(path: str | os.PathLike[str], changes: Mapping[str, object] | None = None) -> Scene:
     """The scene in a YAML or JSON file, in SI.
 
     Args:
@@ -43,7 +43,7 @@ def load_scene(path: str | os.PathLike[str], changes: Mapping[str, Any] | None =
     return parse_scene(_merged(read_mapping(path), changes or {}), os.fspath(path))
 
 
-def parse_scene(document: Mapping[str, Any], source: str = "", key: str = "") -> Scene:
+def parse_scene(document: Mapping[str, object], source: str = "", key: str = "") -> Scene:
     """The scene in a mapping that is laid out like a scene file.
 
     Lists may be tuples or arrays. Paths inside it are relative to the folder of the source.
@@ -69,7 +69,7 @@ def parse_scene(document: Mapping[str, Any], source: str = "", key: str = "") ->
     return _scene(Context(source, key, raw, PER_METRE[model.units.length], model.units.angle == "deg"), model)
 
 
-def _merged(document: Any, changes: Mapping[str, Any]) -> Any:
+def _merged(document: Any, changes: Mapping[str, object]) -> Any:
     result = dict(document)
     for key, value in changes.items():
         old = result.get(key)

@@ -12,7 +12,7 @@ from .support_form import support_form
 from .surface_file import surface_form
 
 
-def scene_document(scene: Scene) -> dict[str, Any]:
+def scene_document(scene: Scene) -> dict[str, object]:
     """The scene as a mapping of plain values in m and rad, which parse_scene reads back to an equal scene,
     exactly.
 
@@ -48,7 +48,7 @@ def scene_document(scene: Scene) -> dict[str, Any]:
             }
             for p in scene.pushes
         ]
-    document: dict[str, Any] = {
+    document: dict[str, object] = {
         "flatpush": "scene/1",
         "units": {"length": "m", "angle": "rad"},
         "object": target,

@@ -7,7 +7,7 @@ from typing import Any
 FOLDER = Path(__file__).parent / "schemas"
 
 
-def scene_schema() -> dict[str, Any]:
+def scene_schema() -> dict[str, object]:
     """The JSON Schema (draft 2020-12) of a scene document. It describes the structure; some rules are beyond
     it."""
     from .scene_model import SceneModel
@@ -15,7 +15,7 @@ def scene_schema() -> dict[str, Any]:
     return _schema(SceneModel, "flatpush scene")
 
 
-def plan_schema() -> dict[str, Any]:
+def plan_schema() -> dict[str, object]:
     """The JSON Schema (draft 2020-12) of a plan document."""
     from .plan_model import PlanModel
 

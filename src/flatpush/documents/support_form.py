@@ -1,6 +1,5 @@
 """Reads and writes what a document says of an object's support."""
 
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,10 +14,12 @@ from . import scene_model as m
 # The form, in SI, in which a support was read. A support keeps its points about their centre, from which
 # those that were written come back only to rounding; with this, a scene that is written and read again stays
 # the same exactly.
-_WRITTEN: "WeakKeyDictionary[Support, dict[str, Any]]" = WeakKeyDictionary()
+_WRITTEN: "WeakKeyDictionary[Support, dict[str, object]]" = WeakKeyDictionary()
+
+Form = str | m.DiscPart | m.RingPart | m.FeetPart | m.PadPart | m.RimPart
 
 
-def read_support(form: Any, outline: Outline, per_metre: float) -> Any:
+def read_support(form: Form, outline: Outline, per_metre: float) -> Support | str:
     """The support of a parsed form; its two words stay words, which Object understands."""
     if isinstance(form, str):
         return form
@@ -32,14 +33,18 @@ def read_support(form: Any, outline: Outline, per_metre: float) -> Any:
         support = Support.points(table[:, :2], table[:, 2])
         _WRITTEN[support] = {"points": table.tolist()}
         return support
-    filled = isinstance(form, m.PadPart)
-    corners = np.array(form.polygon if filled else form.outline, dtype=float) / per_metre
-    support = Support.polygon(corners) if filled else Support.outline(corners)
-    _WRITTEN[support] = {"polygon" if filled else "outline": corners.tolist()}
+    if isinstance(form, m.PadPart):
+        corners = np.array(form.polygon, dtype=float) / per_metre
+        support = Support.polygon(corners)
+        _WRITTEN[support] = {"polygon": corners.tolist()}
+        return support
+    corners = np.array(form.outline, dtype=float) / per_metre
+    support = Support.outline(corners)
+    _WRITTEN[support] = {"outline": corners.tolist()}
     return support
 
 
-def support_form(obj: Object) -> str | dict[str, Any]:
+def support_form(obj: Object) -> str | dict[str, object]:
     """What a scene document says of the support, in SI."""
     if obj.support_word:
         return obj.support_word
@@ -51,7 +56,7 @@ def support_form(obj: Object) -> str | dict[str, Any]:
         places, weights = support.feet
         return {"points": np.column_stack([places, weights]).tolist()}
     if isinstance(pressure, Round):
-        form: dict[str, Any] = {"disc" if pressure.filled else "ring": float(pressure.radius)}
+        form: dict[str, object] = {"disc" if pressure.filled else "ring": float(pressure.radius)}
         return form | ({"centre": centre.tolist()} if np.any(centre) else {})
     if isinstance(pressure, Edges):
         corners = pressure.vertices + centre

@@ -3,7 +3,7 @@
 import json
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -47,7 +47,7 @@ def load_surface(path: str | os.PathLike[str]) -> LimitSurface:
         ) from None
 
 
-def read_surface(form: Any, folder: Path) -> LimitSurface:
+def read_surface(form: SurfaceFilePart | EllipsoidPart | QuarticPart, folder: Path) -> LimitSurface:
     """The limit surface of a parsed form."""
     if isinstance(form, SurfaceFilePart):
         return load_surface(folder / form.file)
@@ -60,7 +60,7 @@ def read_surface(form: Any, folder: Path) -> LimitSurface:
     return Quartic(np.array(form.quartic))
 
 
-def surface_form(surface: LimitSurface) -> dict[str, Any]:
+def surface_form(surface: LimitSurface) -> dict[str, list[object]]:
     """What a document says of a limit surface, in SI."""
     for name, attribute in (("ellipsoid", "matrix"), ("quartic", "coefficients")):
         values = getattr(surface, attribute, None)

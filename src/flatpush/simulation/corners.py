@@ -1,8 +1,7 @@
 """Whether contacts went round a corner of the outline."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from ..contact.placement import SMOOTH_CORNER
 from ..geometry import Outline
@@ -11,7 +10,7 @@ from ..geometry.pose import Array
 AT = 1e-7  # of the outline's size: so near to a corner a contact is on it
 
 
-def passed_a_corner(outline: Outline, points: Array, touching: Any) -> Any:
+def passed_a_corner(outline: Outline, points: Array, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether a contact was on a sharp corner, or went from one side of it to the other, shape (n,).
 
     A corner at which the outline turns by less than contact.placement.SMOOTH_CORNER is not one.

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -157,7 +156,7 @@ def run_chunk(chunk: Chunk) -> Runs:
 
 
 def _together(plan: Plan, parts: Sequence[Runs]) -> Runs:
-    def joined(name: str) -> Any:
+    def joined(name: str) -> Array:
         return np.concatenate([getattr(part, name) for part in parts])
 
     arrays = {name: joined(name) for name in ("starts", "frictions", "centres", "final", "sticking")}

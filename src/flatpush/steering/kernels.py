@@ -1,4 +1,4 @@
-"""Compiled twins of dubins.py and three_twist.py, which explain them, for many pairs of poses at once.
+"""Compiled twins of dubins.py ([Dubins1957], [Shkel2001]) and three_twist.py ([Furtuna2010]), for many pairs of poses.
 
 The lengths are computed without a branch, so that LLVM does several pairs at once: which word is feasible, and
 whether an arc needs a full turn more, are decided by signs of cross products and become selects. Half of the words

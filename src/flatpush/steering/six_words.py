@@ -1,7 +1,8 @@
 """The six words of a car, compiled: the one kernel that refinement, obstacles and control call.
 
-three_twist.py derives the words and is the plain twin. A fleet comes as a record array (k,) of CAR, which Fleet.cars
-makes; a word is a record of WORD. Kernels call, on one car and poses X_WO of shape (3,):
+three_twist.py derives the words ([Dubins1957] for one radius, [Furtuna2010]) and is the plain twin. A fleet comes as a
+record array (k,) of CAR, which Fleet.cars makes; a word is a record of WORD. Kernels call, on one car and poses X_WO of
+shape (3,):
 
     cost = cheapest_word(cars[push], start, goal, found)     # fills the record found, e.g. words[0]
     count = all_words(cars[push], start, goal, found)        # fills the first records of an array (MOST_WORDS,)
@@ -12,13 +13,14 @@ From Python call chain_cost (one leg or several) and every_word.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import inner, kernel, shared
+from ..formulas import Record
 from ..geometry.pose import Array
 from .time_law import rest_to_rest
 
@@ -64,7 +66,7 @@ _CAR, _WORD, _GOAL = np.zeros(1, CAR)[0], np.zeros(1, WORD)[0], _Goal(0.0, 0.0, 
 
 
 @inner
-def cheapest_word(car: Any, start: Array, goal: Array, found: Any) -> float:
+def cheapest_word(car: Record, start: Array, goal: Array, found: Record) -> float:
     """Cost of the cheapest word of a car from pose to pose (inf: none), which is filled in."""
     seen = _seen(car, start, goal)
     best = np.inf
@@ -74,7 +76,7 @@ def cheapest_word(car: Any, start: Array, goal: Array, found: Any) -> float:
 
 
 @inner
-def all_words(car: Any, start: Array, goal: Array, found: Records) -> int:
+def all_words(car: Record, start: Array, goal: Array, found: Records) -> int:
     """How many words of a car lead from pose to pose; they are filled in, cheapest first."""
     seen = _seen(car, start, goal)
     count = 0
@@ -91,7 +93,7 @@ def all_words(car: Any, start: Array, goal: Array, found: Records) -> int:
 
 
 @inner
-def _swap(a: Any, b: Any) -> None:
+def _swap(a: Record, b: Record) -> None:
     a.cost, b.cost = b.cost, a.cost
     a.flat, b.flat = b.flat, a.flat
     for j in range(3):
@@ -100,7 +102,7 @@ def _swap(a: Any, b: Any) -> None:
 
 
 @inner
-def price(car: Any, letter: int, amount: float) -> float:
+def price(car: Record, letter: int, amount: float) -> float:
     """What an amount (angle [rad] or length [m]) of one piece costs: its way, or the time from rest to rest."""
     way, speed = car.rate[letter] * amount, car.speed[letter]
     if speed == np.inf:
@@ -109,7 +111,7 @@ def price(car: Any, letter: int, amount: float) -> float:
 
 
 @inner
-def drive(car: Any, letter: int, amount: float, pose: Array) -> None:
+def drive(car: Record, letter: int, amount: float, pose: Array) -> None:
     """Moves a pose X_WO along one piece."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     if letter == STRAIGHT:
@@ -125,7 +127,7 @@ def drive(car: Any, letter: int, amount: float, pose: Array) -> None:
 
 
 @inner
-def _seen(car: Any, start: Array, goal: Array) -> _Goal:
+def _seen(car: Record, start: Array, goal: Array) -> _Goal:
     c, s = math.cos(start[2]), math.sin(start[2])
     gx, gy, theta = goal[0] - start[0], goal[1] - start[1], goal[2] - start[2]
     x, y = c * gx + s * gy, c * gy - s * gx
@@ -133,7 +135,7 @@ def _seen(car: Any, start: Array, goal: Array) -> _Goal:
 
 
 @shared(0.0, _CAR, _GOAL, 0, 0.0, _WORD)
-def _word(car: Any, goal: _Goal, option: int, limit: float, found: Any) -> float:
+def _word(car: Record, goal: _Goal, option: int, limit: float, found: Record) -> float:
     """Cost of one of the twelve words, filled in if it leads to the goal for less than a limit; else inf.
 
     As in three_twist.py the body point of the last centre moves by w, seen from the first: an arm, turned by the first

@@ -1,11 +1,11 @@
 """Compiled motions among obstacles: whether the words of a push keep clear, and where fingers land and leave."""
 
 import math
-from typing import Any
 
 import numpy as np
 
 from ...compiled import inner, kernel, shared
+from ...formulas import Record
 from ...geometry.collision.body import BodyArrays
 from ...geometry.collision.kernels import BODY, WORLD, arc_gap, line_gap, still_gap
 from ...geometry.pose import Array
@@ -111,7 +111,7 @@ def changes(T: QueryArrays, a: int, b: int, pose: Array) -> bool:
 
 
 @shared(False, QUERY, 0, _POSE, _WORDS[0], _POSE)
-def keeps(T: QueryArrays, a: int, start: Array, word: Any, here: Array) -> bool:
+def keeps(T: QueryArrays, a: int, start: Array, word: Record, here: Array) -> bool:
     """Whether a word of push a keeps the clearance, from a start that is free. `here` ends at its end."""
     # The middles of its pieces refuse most of what is not free.
     put(start, here)

@@ -1,7 +1,7 @@
 """Plans of three arcs with one push each, in closed form, compiled.
 
-Three amounts against three equations: as for the words of one car (steering/three_twist.py), with a body-fixed centre
-or direction of another push for every arc.
+Three amounts against three equations: as for the words of one car (steering/three_twist.py, [Furtuna2010]), with a
+body-fixed centre or direction of another push for every arc.
 """
 
 import math

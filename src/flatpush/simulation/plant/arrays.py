@@ -6,9 +6,10 @@ them, since passing a NamedTuple to a kernel costs more than a step of the plant
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import FlatpushError
 from ...friction import Ellipsoid, Exact, LimitSurface, Quartic
@@ -17,6 +18,7 @@ from ...geometry import Outline
 from ...geometry.pose import Array
 
 SeenRows = Any  # an array of SEEN rows; numpy's types do not know columns by name
+ArraysT = TypeVar("ArraysT", bound=tuple[object, ...])
 Rows = Any  # a sequence of rows with named columns, or a record array
 
 
@@ -218,7 +220,7 @@ def blank(dtype: np.dtype, count: int) -> list[Row]:
     return [Row(dtype.names or ()) for _ in range(count)]
 
 
-def plain_rows(rows: Array) -> list[Any]:
+def plain_rows(rows: Array) -> Rows:
     """A record array as NamedTuples of Python's numbers."""
     Plain = _PLAIN.setdefault(
         rows.dtype, NamedTuple("Plain", [(name, float) for name in rows.dtype.names or ()])
@@ -229,7 +231,7 @@ def plain_rows(rows: Array) -> list[Any]:
 _PLAIN: dict[np.dtype, Any] = {}
 
 
-def interpreted(arrays: Any) -> Any:
+def interpreted(arrays: ArraysT) -> ArraysT:
     """The same NamedTuple with rows that Python reads quickly, also of what it holds."""
     values = []
     for value in arrays:
@@ -238,7 +240,8 @@ def interpreted(arrays: Any) -> Any:
         elif isinstance(value, np.ndarray):
             value = plain_rows(value)
         values.append(value)
-    return type(arrays)(*values)
+    made: Any = type(arrays)
+    return made(*values)
 
 
 def run_arrays(surfaces: Sequence[SurfaceArrays], cofs: Array, frictions: Array) -> RunArrays | None:
@@ -347,6 +350,6 @@ def _sides(start: Array) -> tuple[Array, Array, Array]:
     return start, step / length[:, None], length
 
 
-def records(dtype: np.dtype, rows: Any) -> Array:
+def records(dtype: np.dtype, rows: ArrayLike) -> Array:
     """Rows of numbers as a record array of numbers only."""
     return np.array(rows, dtype=float, order="C").view(dtype).reshape(-1)

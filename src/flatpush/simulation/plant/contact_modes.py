@@ -1,7 +1,7 @@
 """What one or two contacts do to the object at one moment.
 
 Lengths in the surface's unit ℓ, everything about the centre of friction, twists (v, ℓω). PointContact.motion says the
-same of one contact, and contact.several of any number.
+same of one contact ([Zhou2017] Eqs. 10-14), and contact.several of any number.
 """
 
 import math
@@ -24,7 +24,7 @@ _ROOT = 60  # half the iterations that a root of both slips may take
 
 
 @formula
-def _chord(wrench: Wrench, px: float, py: float) -> Any:
+def _chord(wrench: Wrench, px: float, py: float) -> tuple[float, float, float, float]:
     """The forces at p between which all lie that make a wrench of a rotation about a foot: PointContact.forces."""
     radius, fx, fy = wrench.free, wrench.fx, wrench.fy
     dx, dy = wrench.x - px, wrench.y - py
@@ -46,7 +46,7 @@ def _chord(wrench: Wrench, px: float, py: float) -> Any:
 @formula
 def _angles(
     surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, vx: float, vy: float, w: float
-) -> Any:
+) -> tuple[float, float]:
     """Least and largest angle from the normal of the contact forces that make a wrench of a twist."""
     wrench = wrench_of(surface, vx, vy, w)
     fx, fy = wrench.fx, wrench.fy
@@ -62,9 +62,9 @@ def _angles(
 @formula
 def edge_twist(
     surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, mu: float, left: bool
-) -> Any:
+) -> tuple[float, float, float]:
     """A twist under the force on the left or right edge of the friction cone, such that ∇H is as it comes."""
-    tangent = mu if left else -mu
+    tangent = mu if left else -mu  # [Zhou2017] Eqs. 10-11
     fx, fy = nx - tangent * ny, ny + tangent * nx
     return twist_of(surface, fx, fy, px * fy - py * fx)
 
@@ -72,7 +72,7 @@ def edge_twist(
 @formula
 def one(
     surface: SurfaceArrays, px: float, py: float, nx: float, ny: float, ux: float, uy: float, mu: float
-) -> Any:
+) -> tuple[int, float, float, float, float]:
     """PointContact.motion: mode, twist (3) and slip."""
     speed = math.sqrt(ux * ux + uy * uy)
     if speed == 0.0:
@@ -89,20 +89,20 @@ def one(
         if still:
             return (LEFT if left else RIGHT), 0.0, 0.0, 0.0, side
     half = math.atan(mu)
-    vx, vy, w = stick_of(surface, px, py, ux, uy)
+    vx, vy, w = stick_of(surface, px, py, ux, uy)  # [Zhou2017] Eq. 13
     low, high = _angles(surface, px, py, nx, ny, vx, vy, w)
     if high >= -half - _ANGLE and low <= half + _ANGLE:
         return STICKING, vx, vy, w, 0.0
     left = low > 0
     vx, vy, w = edge_twist(surface, px, py, nx, ny, mu, left)
-    scale = approach / ((vx - w * py) * nx + (vy + w * px) * ny)
+    scale = approach / ((vx - w * py) * nx + (vy + w * px) * ny)  # [Zhou2017] Eq. 14
     vx, vy, w = scale * vx, scale * vy, scale * w
     slip = nx * (uy - vy - w * px) - ny * (ux - vx + w * py)
     return (LEFT if left else RIGHT), vx, vy, w, slip
 
 
 @formula
-def _edge_wrench(at: Row, tangent: float) -> Any:
+def _edge_wrench(at: Row, tangent: float) -> tuple[float, float, float]:
     """The wrench of the force at a contact whose tangential part, to the left, is so many times its normal part."""
     fx, fy = at.nx - tangent * at.ny, at.ny + tangent * at.nx
     return fx, fy, at.x * fy - at.y * fx
@@ -117,7 +117,7 @@ def _set_ray(ray: Row, at: Row, tangent: float) -> None:
 
 
 @formula
-def _holds(surface: SurfaceArrays, vx: float, vy: float, w: float, scratch: Scratch, count: int) -> Any:
+def _holds(surface: SurfaceArrays, vx: float, vy: float, w: float, scratch: Scratch, count: int) -> bool:
     """Whether some wrench of a twist lies in the closed cone of the unit rays (count, 3), which span space.
 
     The cone's faces are planes through two of its rays that leave no other behind them. About a foot's free force g
@@ -245,14 +245,14 @@ def _both_push(
 
 
 @formula
-def _slip(at: Row, vx: float, vy: float, w: float) -> Any:
+def _slip(at: Row, vx: float, vy: float, w: float) -> float:
     """Tangential velocity of the finger less the object's at a contact, + to the left."""
     rx, ry = at.ux - vx + w * at.y, at.uy - vy - w * at.x
     return at.nx * ry - at.ny * rx
 
 
 @formula
-def _both_slide(surface: SurfaceArrays, c: Rows, mu: float, speed: float) -> Any:
+def _both_slide(surface: SurfaceArrays, c: Rows, mu: float, speed: float) -> tuple[bool, float, float, float]:
     """Both contacts slide: ok and the twist, among those that keep both normal velocities, V₀ + ω k.
 
     Between the two ω at which a slip vanishes, and beyond them, the sides on which both slide are known; what is sought
@@ -351,7 +351,7 @@ def _both_slide(surface: SurfaceArrays, c: Rows, mu: float, speed: float) -> Any
 
 
 @formula
-def two(surface: SurfaceArrays, mu: float, scratch: Scratch) -> Any:
+def two(surface: SurfaceArrays, mu: float, scratch: Scratch) -> tuple[int, int, int, float, float, float]:
     """Two contacts at once: status, both modes and the twist.
 
     Of several answers, which friction allows now and then, the first of: both stick, one sticks and the other slides,
@@ -380,7 +380,7 @@ def two(surface: SurfaceArrays, mu: float, scratch: Scratch) -> Any:
                 for i in range(2):
                     _set_ray(rays[2 * i], c[i], mu)
                     _set_ray(rays[2 * i + 1], c[i], -mu)
-                if _holds(surface, vx, vy, w, scratch, 4):
+                if _holds(surface, vx, vy, w, scratch, 4):  # [Zhou2017] Sec. 4.2
                     return GOING, STICKING, STICKING, vx, vy, w
         # One sticks, the other slides.
         for i in range(2):

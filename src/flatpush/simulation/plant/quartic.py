@@ -1,6 +1,6 @@
 """A quartic limit surface on plain numbers: its Hessian, the wrench of a twist, the twist of a held point.
 
-Units as in simulation.plant.resistance; friction.quartic says the same by arrays.
+Units as in simulation.plant.resistance; friction.quartic says the same by arrays ([Zhou2017] Eqs. 1, 13).
 """
 
 import math

@@ -1,7 +1,8 @@
 """How the table resists: the wrench of a twist, the twist of a wrench, the twist of a held point.
 
 Everything is about the centre of friction in the surface's unit of length ℓ (arrays), and so are the twists (v, ℓω) and
-the wrenches (f, τ/ℓ) here. Only directions of wrenches count. The limit surfaces of friction/ say the same by arrays.
+the wrenches (f, τ/ℓ) here. Only directions of wrenches count. The limit surfaces of friction/ say the same by arrays:
+a twist of a wrench is ∇H ([Zhou2017] Eq. 1), that of a held point solves Eq. 13 for the force.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Fingers against an object over a stretch of their motion: at most two contacts at a time.
 
 Python runs these formulas as they stand, and simulation.plant.kernels compiles them. A step is a fourth-order
-Runge-Kutta-Munthe-Kaas step (exact where the twist is constant); where contact modes or the touched
+Runge-Kutta-Munthe-Kaas step ([MuntheKaas1998]; exact where the twist is constant); where contact modes or the touched
 features change on the way it is halved down to a thirty-second, and where a finger touches it ends. The plain version,
 for any number of contacts and any surface, is simulation.plant.plain.
 """

@@ -1,4 +1,4 @@
-"""Search on a lattice of poses: A* over steps of the pushes, from the start, with exact words on to the goal.
+"""Search on a lattice of poses: A* ([Hart1968]) over steps of the pushes, with exact words on to the goal.
 
 A step is a short turn to the left, straight on or a turn to the right of a push, or the same of another push after a
 change. Poses are not moved to the lattice: of all that fall into one cell of position, heading and push the cheapest

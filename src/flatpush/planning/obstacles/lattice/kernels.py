@@ -1,4 +1,4 @@
-"""The compiled search on a lattice; the package's docstring explains it."""
+"""The compiled search on a lattice ([Hart1968]); the package's docstring explains it."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Compiled growth of two random trees; the package's docstring explains them."""
+"""Compiled growth of two random trees ([Kuffner2000]); the package's docstring explains them."""
 
 import math
 from typing import Any, NamedTuple
