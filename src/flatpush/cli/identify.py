@@ -1,4 +1,4 @@
-"""flatpush identify: limit surfaces from measured pairs of wrench and twist."""
+"""flatpush identify: limit surfaces from measured pairs of wrench and twist, or the table from motion alone."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,13 +15,18 @@ def command(
     data: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DATA…", help="CSV files of wrenches and twists; columns fx,fy,tau,vx,vy,omega."
+            metavar="DATA…",
+            help="CSV files of wrenches and twists (fx,fy,tau,vx,vy,omega), or of poses of object and finger"
+            " (t,x,y,theta,px,py); .mcap.",
         ),
     ],
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Write the surface here, for a scene's surface: {file: …}."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write the surface here, for a scene's surface: {file: …}; from motion the scene.",
         ),
     ] = None,
     figure: Annotated[
@@ -35,7 +40,8 @@ def command(
         ),
     ] = "auto",
     scene: Annotated[
-        Path | None, typer.Option(metavar="SCENE", help="Also fit the loads on this scene's support.")
+        Path | None,
+        typer.Option(metavar="SCENE", help="Also fit the loads on this scene's support; motion needs it."),
     ] = None,
     pool: Annotated[bool, typer.Option("--pool", help="One surface for all experiments together.")] = False,
     units: Annotated[
@@ -49,10 +55,17 @@ def command(
     skip_bad: Annotated[
         bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")
     ] = False,
+    columns: Annotated[
+        str, typer.Option(metavar="NAMES", help="Your own names of columns of motion: x=obj_x[mm],theta=yaw.")
+    ] = "",
+    suggests: Annotated[
+        bool, typer.Option("--suggest", help="From motion: the next three pushes that would teach most.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
-    """Fit limit surfaces to DATA and say how well they predict pushes that they have not seen."""
-    from ..documents import check_outputs, save_surface, scene_files
+    """Fit limit surfaces to DATA and say how well they predict pushes that they have not seen; or, from poses of object
+    and finger alone, where the object presses and the finger's friction."""
+    from ..documents import check_outputs, is_motion_file, save_surface, scene_files
 
     if model not in MODELS:
         raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
@@ -63,6 +76,21 @@ def command(
     if length is not None and not 0 < length < float("inf"):
         raise InputError("--length is positive and finite", value=length)
     check_outputs([*data, *(() if scene is None else scene_files(scene))], [output, figure])
+    moves = [is_motion_file(path) for path in data]
+    if any(moves):
+        if not all(moves):
+            raise InputError(
+                "these files are of motion or of wrenches, not both", value=[str(p) for p in data]
+            )
+        if scene is None:
+            raise InputError("friction from motion needs the object's outline", hint="--scene SCENE")
+        if figure is not None:
+            raise InputError("--figure draws surfaces from wrenches, not from motion")
+        from .identify_motion import Asked, identify_motion
+
+        return identify_motion(Asked(data, scene, output, units, columns, skip_bad, suggests, as_json))
+    if columns or suggests:
+        raise InputError("--columns and --suggest are for recordings of motion (t,x,y,theta,px,py)")
     if figure is not None:
         from ..view.picture import check_ending
 
@@ -160,10 +188,9 @@ def _read(data: list[Path], units: str, skip_bad: bool, pool: bool) -> tuple[lis
 
     from ..documents import load_pairs
     from ..friction.pairs import Pairs
+    from .identify_motion import units_of
 
-    parts = [part.strip() for part in units.split(",")]
-    if len(parts) != 2:
-        raise InputError("--units takes a length and an angle, such as mm,deg", value=units)
+    parts = units_of(units)
     experiments: list[Any] = []
     notes: list[str] = []
     for path in data:

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from .atomic import check_outputs, check_writable, write_atomically
     from .export import export_csv
     from .files_read import as_read, plan_files, scene_files
+    from .fitted_scene import save_fitted_scene
+    from .motion_file import Motion, MotionFile, is_motion_file, load_motions, own_columns
     from .outline_reader import OutlineNote, outline_note
     from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BadRow",
+    "Motion",
+    "MotionFile",
     "OutlineNote",
     "PairsFile",
     "RobotLog",
@@ -33,18 +37,22 @@ __all__ = [
     "check_outputs",
     "check_writable",
     "export_csv",
+    "is_motion_file",
+    "load_motions",
     "load_pairs",
     "load_plan",
     "load_robot_log",
     "load_scene",
     "load_surface",
     "outline_note",
+    "own_columns",
     "parse_plan",
     "parse_scene",
     "plan_document",
     "plan_files",
     "plan_schema",
     "read_mapping",
+    "save_fitted_scene",
     "save_plan",
     "save_rollouts",
     "save_runs",
@@ -58,6 +66,12 @@ __all__ = [
 
 _HOME = {
     "BadRow": "pairs_file",
+    "Motion": "motion_file",
+    "MotionFile": "motion_file",
+    "is_motion_file": "motion_file",
+    "load_motions": "motion_file",
+    "own_columns": "motion_file",
+    "save_fitted_scene": "fitted_scene",
     "OutlineNote": "outline_reader",
     "PairsFile": "pairs_file",
     "RobotLog": "robot_log",

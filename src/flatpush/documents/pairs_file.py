@@ -24,7 +24,7 @@ STAMPS = ("t", "time", "stamp")
 GROUPS = ("experiment", "surface", "pressure")
 MOST_BYTES = 100_000_000
 _MOST_NAMED = 5
-_HEADER = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:[\[(]([^\])]*)[\])])?\s*")
+HEADER = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:[\[(]([^\])]*)[\])])?\s*")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def load_pairs(
     if length not in PER_METRE or angle not in ("rad", "deg"):
         raise InputError("units are m, cm or mm and rad or deg", value=f"{length},{angle}")
     text = read_text(path, MOST_BYTES)
-    lines = _lines(text, source)
+    lines = csv_lines(text, source)
     header = next(lines, None)
     if header is None:
         raise InputError("the file is empty", source=source, hint=_FORMAT)
@@ -123,7 +123,7 @@ class _Columns:
     groups: tuple[int, ...]
 
 
-def _lines(text: str, source: str) -> Iterator[tuple[int, list[str]]]:
+def csv_lines(text: str, source: str) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of the lines that are neither empty nor a comment."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     while True:
@@ -140,7 +140,7 @@ def _lines(text: str, source: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _columns(cells: Sequence[str], source: str) -> _Columns:
-    found = [_HEADER.fullmatch(cell) for cell in cells]
+    found = [HEADER.fullmatch(cell) for cell in cells]
     names = [match[1] if match else cell.strip() for match, cell in zip(found, cells, strict=True)]
     for name in names:
         if name and names.count(name) > 1:

@@ -1,0 +1,338 @@
+"""The table and the finger's friction from poses alone: against a simulated table that is known exactly."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+
+import flatpush as fp
+from flatpush.cli.app import main
+from flatpush.documents import load_motions
+from flatpush.documents.motion_file import Motion
+from flatpush.errors import InputError
+from flatpush.friction import Support
+from flatpush.geometry import Outline, compose, log, rotate, transform
+from flatpush.identification import fit_motion, look, radii, suggest, summarise, turning_radius
+from flatpush.identification.fit import _Search
+from flatpush.identification.pressure import Density, FreeFeet, KnownFeet
+from flatpush.problem import Object
+from flatpush.simulation.plant import Plant
+
+TIP = 0.0025
+CORNERS = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
+FEET = [(-0.02, -0.01), (0.025, -0.012), (0.0, 0.015)]
+LOADS = np.array([2, 4, 3]) / 9
+TABLE = Object(CORNERS, support=Support.points(FEET, LOADS), friction=0.3)
+EXPECTED = Object(CORNERS, support=Support.points(FEET), friction=0.4)
+# Edge, place along it, direction of the finger to the left of the normal [deg].
+PUSHES = [(0, 0.3, 25), (0, 0.7, -25), (1, 0.4, 20), (2, 0.3, -30), (2, 0.6, 30), (3, 0.5, -15), (3, 0.7, 0)]
+
+
+def pushed(thing=TABLE, pushes=PUSHES, length=0.08, noise=(1e-4, 1.7e-3), rate=30, seed=5):
+    """Pushes at 20 mm/s of an object that a camera sees with noise."""
+    rng, plant, found = np.random.default_rng(seed), Plant(thing, [[0.0, 0.0]], TIP), []
+    for k, (edge, along, degrees) in enumerate(pushes):
+        at = thing.outline.at(edge, along)
+        pose = np.array([0.1, -0.05, rng.uniform(-3, 3)])
+        frames = int(length / 0.02 * rate)
+        way = np.outer(np.linspace(-0.002, length, frames), rotate(np.deg2rad(degrees), at.normal))
+        tips = transform(pose, at.point - TIP * at.normal + way)
+        poses = plant.follow(pose, np.column_stack([tips, np.zeros(frames)])).object
+        seen = poses + rng.normal(size=poses.shape) * [noise[0], noise[0], noise[1]]
+        found.append(Motion(f"push {k}", np.arange(frames) / rate, seen, tips, np.arange(frames) + 2))
+    return found
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return fit_motion(pushed(), EXPECTED, TIP)
+
+
+def test_loads_and_friction_come_from_poses_alone(fitted):
+    spread = fitted.pressure.at(fitted.numbers)
+    summary = summarise(fitted, [], [])
+    assert spread.loads == pytest.approx(LOADS, abs=0.01)
+    assert np.all(np.abs(spread.loads - LOADS) < 5 * summary.shares_sd)
+    assert np.all(summary.shares_sd < 0.01)
+    assert fitted.thing.friction == pytest.approx(0.3, rel=0.02)
+    assert abs(fitted.thing.friction - 0.3) < 5 * summary.friction_sd
+    assert np.hypot(*(fitted.thing.cof - TABLE.cof)) < 3e-4
+    assert fitted.scatter < 1.5
+    assert summary.slid
+    assert summary.untold == ()
+
+
+def test_radii_lie_within_what_they_are_said_to(fitted):
+    places = [TABLE.outline.at(edge, along) for edge in range(4) for along in (0.3, 0.5, 0.7)]
+    found = radii(fitted, places)
+    true = np.array([turning_radius(TABLE, at) for at in places])
+    seen = np.array([[r.value, r.sd] for r in found])
+    turns = np.isfinite(true)
+    assert turns.sum() >= 6
+    assert np.all(np.abs(seen[turns, 0] - true[turns]) < 5 * seen[turns, 1])
+    near = turns & (true < 0.1)
+    assert seen[near, 0] == pytest.approx(true[near], rel=0.03)
+
+
+def test_turning_centres_are_those_of_an_object_that_a_sliding_finger_turns():
+    """A finger that slides off to either side turns the object about the two centres; the plant says where they are."""
+    plant = Plant(TABLE, [[0.0, 0.0]], TIP)
+    for edge, along in ((1, 0.5), (3, 0.5), (3, 0.3)):
+        at = TABLE.outline.at(edge, along)
+        centres = []
+        for side in (1, -1):
+            step = 1e-6 * rotate(side * np.deg2rad(70), at.normal)
+            begin = np.array([*(at.point - TIP * at.normal), 0.0])
+            turned = plant.follow(np.zeros(3), [begin, begin + np.array([*step, 0.0])]).object[-1]
+            V = log(turned)
+            centres.append(np.array([-V[1], V[0]]) / V[2])
+        assert turning_radius(TABLE, at) == pytest.approx(np.hypot(*(centres[0] - centres[1])) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("family", ["feet", "density", "free"])
+def test_derivatives_are_those_of_the_plant(family):
+    """Ends of stretches are moved by small changes of each number as the equations of motion say."""
+    seen = look(pushed(noise=(1e-6, 1e-6)), TABLE.outline, TIP)
+    family = {
+        "feet": KnownFeet(np.array(FEET), LOADS),
+        "density": Density(TABLE.outline),
+        "free": FreeFeet(TABLE.outline, 3),
+    }[family]
+    x = family.numbers(np.array(FEET), LOADS) if isinstance(family, FreeFeet) else family.mean
+    search = _Search(family, seen, EXPECTED, TIP, np.log(0.3))
+    z = np.append(x, np.log(0.3))
+    here = search.roll(z)
+    misses = []
+    for k in (0, 1, len(z) - 2, len(z) - 1):
+        step = np.zeros(len(z))
+        step[k] = 1e-4
+        numeric = (search.roll(z - step).errors - search.roll(z + step).errors) / 2e-4
+        size = np.linalg.norm(numeric, axis=1)
+        tells = size > 0.1 * size.max()
+        misses += (np.linalg.norm(numeric - here.jacobian[:, :, k], axis=1)[tells] / size[tells]).tolist()
+    assert np.median(misses) < 0.03  # stretches in which the contact changes its mode are off by more
+    assert np.percentile(misses, 75) < 0.3
+
+
+@pytest.mark.slow
+def test_an_unknown_face_is_told_from_a_rim():
+    for word, share in (("uniform", 0.0), ("outline", 1.0)):
+        table = Object(CORNERS, support=word, friction=0.3)
+        fit = fit_motion(pushed(table), Object(CORNERS, friction=0.4), TIP)
+        places = [table.outline.at(edge, along) for edge in range(4) for along in (0.3, 0.5, 0.7)]
+        errors = [turning_radius(fit.thing, at) / turning_radius(table, at) - 1 for at in places]
+        assert fit.pressure.name == "density"
+        assert np.nanmax(np.abs(errors)) < 0.1, word
+        assert fit.thing.friction == pytest.approx(0.3, rel=0.05)
+        covariance = table.support.covariance
+        assert np.trace(fit.thing.support.covariance) == pytest.approx(np.trace(covariance), rel=0.05), share
+
+
+def test_what_pushes_do_not_tell_is_said_and_stays_as_expected():
+    """Two short pushes that only stick: a good fit, but friction has only a bound."""
+    fit = fit_motion(pushed(pushes=[(0, 0.6, 0), (2, 0.4, 0)], length=0.04), EXPECTED, TIP)
+    at = TABLE.outline.at(1, 0.5)
+    found = radii(fit, [at])
+    summary = summarise(fit, ["east"], found)
+    assert not summary.slid
+    assert fit.thing.friction == pytest.approx(0.4, rel=0.01)
+    assert summary.friction_sd > 0.15
+    assert any("friction" in text for text in summary.untold)
+    assert any("fit at noise level" in text for text in summary.untold)
+    assert found[0].sd > 0.1 * found[0].value
+    assert any("turning radius of east" in text for text in summary.untold)
+
+
+def test_suggested_pushes_teach_what_they_promise():
+    """The uncertainty after making the pushes is what was foretold; others leave more."""
+    first = pushed(pushes=[(0, 0.6, 10), (2, 0.4, -30)])
+    fit = fit_motion(first, EXPECTED, TIP)
+    places = [TABLE.outline.at(edge, 0.5) for edge in (1, 3)]
+    before = np.sqrt(np.mean([(r.sd / r.value) ** 2 for r in radii(fit, places)]))
+    next_ = suggest(fit, places, TIP, length=0.08)
+    assert len(next_) == 3
+    assert next_[0].uncertainty < before
+    assert next_[2].uncertainty < next_[1].uncertainty < next_[0].uncertainty
+    more = [(s.at.edge, s.at.along, np.rad2deg(s.direction)) for s in next_]
+    again = fit_motion(first + pushed(pushes=more, seed=8), EXPECTED, TIP)
+    after = np.sqrt(np.mean([(r.sd / r.value) ** 2 for r in radii(again, places)]))
+    assert after < 0.8 * before
+    assert after == pytest.approx(next_[2].uncertainty, rel=0.6)
+
+
+def test_free_feet_and_densities_are_pressures():
+    outline = Outline.polygon(CORNERS)
+    for family in (Density(outline), FreeFeet(outline, 4), KnownFeet(np.array(FEET), LOADS)):
+        rng = np.random.default_rng(0)
+        for _ in range(5):
+            x = family.mean + 0.3 * rng.normal(size=len(family.mean))
+            spread = family.at(x)
+            assert np.sum(spread.loads) == pytest.approx(1)
+            assert np.min(spread.loads) >= 0
+            for k in range(len(x)):
+                step = np.eye(len(x))[k] * 1e-6
+                numeric = (family.at(x + step).loads - family.at(x - step).loads) / 2e-6
+                assert numeric == pytest.approx(spread.by_loads[:, k], abs=1e-6)
+
+
+def written(motions, path, header="t,x [mm],y [mm],theta [deg],px [mm],py [mm],push"):
+    lines = [header]
+    for k, m in enumerate(motions):
+        for t, (x, y, turn), (px, py) in zip(m.times, m.poses, m.tips, strict=True):
+            numbers = [t, 1e3 * x, 1e3 * y, np.rad2deg(turn), 1e3 * px, 1e3 * py]
+            lines.append(",".join(f"{value:.5f}" for value in numbers) + f",{k}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+SCENE = """# a comment
+flatpush: scene/1
+units: {length: mm, angle: deg}
+object:
+  outline: [[-30, -20], [30, -20], [30, 20], [-30, 20]]
+  support: {points: [[-20, -10, 1], [25, -12, 1], [0, 15, 1]]}
+  friction: 0.4
+pusher: {fingers: 1, tip_radius: 2.5}
+start: [60, 20, 135]
+goal: [0, 0, 0]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """The command: status, standard output, standard error."""
+
+    def identify(*arguments):
+        monkeypatch.setattr("sys.argv", ["flatpush", "identify", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0), *capsys.readouterr()
+
+    return identify
+
+
+def test_from_a_log_with_names_of_its_own_to_a_scene(tmp_path, scene, run):
+    """Two commands: identify, and whatever uses the scene; everything but support and friction stays."""
+    log = written(pushed(), tmp_path / "log.csv", "stamp,ox,oy,yaw,fx_mm,fy_mm,push")
+    target = tmp_path / "sub" / "fitted.yaml"
+    target.parent.mkdir()
+    names = "t=stamp,x=ox[mm],y=oy[mm],theta=yaw[deg],px=fx_mm[mm],py=fy_mm[mm]"
+    status, out, err = run(log, "--scene", scene, "--columns", names, "-o", target, "--json")
+    assert status == 0, err
+    told = json.loads(out)
+    assert told["friction"] == pytest.approx(0.3, rel=0.02)
+    assert told["shares"] == pytest.approx(LOADS, abs=0.01)
+    assert all(sd > 0 for sd in told["shares_sd"])
+    before, after = fp.load_scene(scene), fp.load_scene(target)
+    assert after.object.friction == pytest.approx(told["friction"], rel=1e-5)
+    assert after.object.support.feet[1] == pytest.approx(told["shares"], rel=1e-5)
+    raw = yaml.safe_load(target.read_text())
+    assert raw["pusher"] == {"fingers": 1, "tip_radius": 2.5}
+    assert after.start == pytest.approx(before.start)
+
+
+def test_the_log_of_a_run_and_its_bag_hold_the_same_motion(tmp_path):
+    from types import SimpleNamespace
+
+    from flatpush.execution.log import open_log
+
+    motion = pushed(pushes=PUSHES[:1])[0]
+    for name in ("run.csv", "run.mcap"):
+        with open_log(tmp_path / name, "block") as log:
+            for t, pose, tip in zip(motion.times, motion.poses, motion.tips, strict=True):
+                tool = np.array([*tip, 0.0, 0.0])
+                log.write(
+                    SimpleNamespace(
+                        time=t, leg="push", push=0, mode="sticking", object=pose,
+                        state=SimpleNamespace(pose=tool), target=SimpleNamespace(pose=tool, twist=np.zeros(4)),
+                    )
+                )  # fmt: skip
+        (read,) = load_motions(tmp_path / name).motions
+        assert read.tips == pytest.approx(motion.tips, abs=1e-8), name
+        assert read.times == pytest.approx(motion.times, abs=1e-6)
+        assert rotate(read.poses[:, 2], [1.0, 0.0]) == pytest.approx(
+            rotate(motion.poses[:, 2], [1.0, 0.0]), abs=1e-6
+        )
+
+
+def changed(how):
+    """Recordings with one thing wrong."""
+    motions = pushed()[:2]
+    m = motions[1]
+    poses, tips, times, lines = m.poses.copy(), m.tips.copy(), m.times.copy(), m.lines
+    if how == "rest":
+        return [Motion("rest", times, np.tile(poses[:1], (len(poses), 1)), tips, lines)]
+    if how == "jump":
+        poses[60:] = compose(poses[60:], [0.02, 0.0, 0.0])
+    if how == "mirrored":
+        poses[:, [0, 2]] *= -1
+        tips[:, 0] *= 1
+    if how == "scaled":
+        poses[:, :2] = poses[0, :2] + 1.3 * (poses[:, :2] - poses[0, :2])
+    return [motions[0], Motion(m.name, times, poses, tips, lines)]
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("rest", "no recording holds a push"),
+        ("jump", "line 62: the object jumps by"),
+        ("mirrored", "the object moves while the finger is"),
+        ("scaled", "the object moves while the finger is"),
+    ],
+)
+def test_impossible_recordings_are_named(how, words):
+    with pytest.raises(InputError, match=words):
+        look(changed(how), TABLE.outline, TIP)
+
+
+def test_the_scene_of_another_object_is_noticed():
+    with pytest.raises(InputError, match="scene of another object"):
+        look(pushed(), Outline.circle(0.04), TIP)
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda rows: [*rows[:5], rows[4], *rows[5:]], "line 6: its stamp .* repeats that of line 5"),
+        (
+            lambda rows: [*rows[:5], rows[3], *rows[5:]],
+            "line 6: its stamp .* runs back behind that of line 5",
+        ),
+        (lambda rows: [*rows[:7], "1,2,3", *rows[7:]], "line 8: it has 3 of 7 columns"),
+        (
+            lambda rows: [*rows[:7], rows[7].replace(rows[7].split(",")[2], "nan"), *rows[8:]],
+            "line 8: y is not finite",
+        ),
+        (lambda rows: ["t,x,y,theta,qx,qy,push", *rows[1:]], "line 1 names no column px"),
+        (lambda rows: [rows[0].replace("[deg]", "[turns]"), *rows[1:]], "a unit among rad, deg"),
+        (lambda rows: rows[:1], "no usable row"),
+    ],
+)
+def test_bad_rows_are_named_by_line_and_leave_no_traceback(tmp_path, scene, run, edit, words):
+    path = written(pushed(pushes=PUSHES[:1]), tmp_path / "log.csv")
+    path.write_text("\n".join(edit(path.read_text().splitlines())) + "\n")
+    status, _, err = run(path, "--scene", scene, "-o", tmp_path / "fitted.yaml")
+    assert status == 2
+    assert re.search(words, err), err
+    assert "Traceback" not in err
+    assert not (tmp_path / "fitted.yaml").exists()
+
+
+def test_motion_needs_a_scene_and_wrenches_no_columns(tmp_path, scene, run):
+    path = written(pushed(pushes=PUSHES[:1]), tmp_path / "log.csv")
+    assert "--scene SCENE" in run(path)[2]
+    assert "roles are t, x, y" in run(path, "--scene", scene, "--columns", "a=b")[2]
+    pairs = tmp_path / "pairs.csv"
+    pairs.write_text("fx,fy,tau,vx,vy,omega\n1,0,0,1,0,0\n")
+    assert "not both" in run(path, pairs, "--scene", scene)[2]
+    assert "are for recordings of motion" in run(pairs, "--suggest")[2]
