@@ -123,6 +123,16 @@ def test_the_rest_of_a_path_is_what_is_left_of_it():
         assert abs(np.rad2deg(error[2])) < 0.5
 
 
+def test_a_loop_that_grows_with_the_radius_is_not_cut_short():
+    """From beside the goal, where only a loop leads to it: a contact that is seen a little nearer to the centre makes
+    the loop some millimetres longer, and what seemed to be left, closed at once, would be far from the heading."""
+    pose, goal = (0.002, 0.004, 0.3), (0.0, 0.0, 0.0)
+    for first, now in ((0.057, 0.058), (0.057, 0.065)):
+        before = rest_of_path(pose, goal, first, 1 / first, 1 / first, np.inf).length
+        rest = rest_of_path(pose, goal, now, 1 / now, 1 / now, before)
+        assert (rest.how, rest.length > before > 6 * first) == ("planned", True)
+
+
 def test_near_the_end_the_tolerance_says_which_error_counts():
     """2 mm to the side and 10 mm to go cannot be met: the turn that is chosen is better than any other."""
     tolerance, lever, d = (0.002, np.deg2rad(2)), 0.01, 0.008

@@ -18,6 +18,8 @@ How = Literal["even", "planned", "tight", "closing", "past"]
 LONGER = 0.15
 # By so much of a step a planned rest may grow in it.
 GROWS = 0.25
+# Far from the end, in radii of what is left of the last, it may grow by a radius.
+FAR = 4.0
 # Two arcs are for headings that differ from the way straight to the goal by less than this [rad].
 EVEN = 1.0
 # The last stretch is shorter than this [radii] and within this of the heading [rad].
@@ -68,8 +70,9 @@ def rest_of_path(
         kappa, other, length = biarc(flat, goal)
         if max(abs(kappa), abs(other)) * radius <= 1 and length <= most:
             return Rest(kappa, length, "even")
-    # On the brink of being too late for a turn the planned one comes out a little longer at every step.
-    known = before + GROWS * step
+    # On the brink of being too late for a turn the planned one comes out a little longer at every step; with most of a
+    # way still to go a longer one is better than to close in what is left of a loop.
+    known = before + (radius if before > FAR * radius else GROWS * step)
     for how, turning, longest in (("planned", radius, known), ("tight", 1 / min(left, right), most)):
         path = shortest_path(np.array(flat), np.array(goal), turning)
         if path.length <= longest:
