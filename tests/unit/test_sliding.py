@@ -116,18 +116,43 @@ def test_ways_of_the_agent_are_the_law_written_out(policy):
     agent, rng = policy.agent, np.random.default_rng(2)
     for first in range(3):
         place, target = rng.uniform(0.2, 0.3, (2, 2))
-        commands, ways = agent.ways(place, target, rng.uniform(0.15, 0.35, (8, first, 2)))
-        assert len(commands)
-        for command, way in zip(commands, ways, strict=True):
+        for begun in rng.uniform(0.15, 0.35, (8, first, 2)):
+            command = agent.way(place, target, begun)
             written, velocity = followed(agent, place, np.zeros(2), command)
-            assert np.allclose(way, written, atol=1e-12)
-            assert np.allclose(way[-1], target, atol=1e-12)
+            assert np.array_equal(command[:first], begun)
+            places = agent.laws(first)[1] @ (np.concatenate([place[None], begun]) - target) + target
+            assert np.allclose(places, written, atol=1e-12)
+            assert np.allclose(written[-1], target, atol=1e-12)
             assert np.allclose(velocity, 0, atol=1e-11)
     commands = agent.straight(np.array([0.1, 0.2]), np.array([0.48, 0.5]))
     written, velocity = followed(agent, np.array([0.1, 0.2]), np.zeros(2), commands)
     assert np.allclose([*written[-1], *velocity], [0.48, 0.5, 0, 0], atol=1e-11)
     assert len(commands) > 2  # two would have to command a place beyond the room
     assert np.allclose(cross([0.38, 0.3], written - [0.1, 0.2]), 0, atol=1e-12)
+
+
+def test_the_way_around_is_the_shortest_clear_one_of_all(policy):
+    """Against every candidate followed through the law, its gaps measured by shapely."""
+    from shapely import Polygon, points
+
+    from flatpush.gym.kernels import shortest_clear
+    from flatpush.gym.push_t import BOXES
+
+    agent, rng = policy.agent, np.random.default_rng(5)
+    pose, place, target = np.array([0.25, 0.25, 2.0]), np.array([0.12, 0.3]), np.array([0.4, 0.22])
+    begun = rng.uniform(0.0, 0.512, (400, 2, 2))
+    obstacle, lengths = Polygon(transform(pose, tee().outline.vertices)), []
+    for first in begun:
+        commands = agent.way(place, target, first)
+        way, _ = followed(agent, place, np.zeros(2), commands)
+        clear = obstacle.distance(points(way)).min() >= TIP + 0.001
+        clear &= bool(np.all((commands >= 0) & (commands <= 0.512)))
+        lengths.append(np.linalg.norm(np.diff(way, axis=0), axis=1).sum() if clear else np.inf)
+    found = shortest_clear(*agent.laws(2), place, target, begun, 0.512, pose, BOXES, TIP + 0.001)
+    assert 5 < np.isfinite(lengths).sum() < 300
+    assert found == np.argmin(lengths)
+    far = np.full(2, 0.9)  # no commands within the room lead there and rest
+    assert shortest_clear(*agent.laws(2), place, far, begun, 0.512, pose, BOXES, TIP) == -1
 
 
 def covered(pose) -> float:

@@ -32,20 +32,18 @@ class Agent:
     substeps: int
     room: float
 
-    def ways(self, place: Array, target: Array, begun: Array) -> tuple[Array, Array]:
-        """Ways from rest at a place (2,) to rest at a target (2,), of n beginnings of m commands (n, m, 2).
+    def way(self, place: Array, target: Array, begun: Array) -> Array:
+        """Commands (m + 2, 2) from rest at a place (2,) to rest at a target (2,), the first m of them given (m, 2)."""
+        last_of, _ = self.laws(len(begun))
+        return np.concatenate([begun, last_of @ (np.concatenate([place[None], begun]) - target) + target])
 
-        Returns:
-            commands: shape (n, m + 2, 2); those that may not be given are left out.
-            places: after every substep, shape (n, (m + 2) · substeps, 2).
+    def laws(self, first: int) -> tuple[Array, Array]:
+        """For 0, 1 or 2 first commands of a way from rest to rest: its last two commands, and its places.
+
+        Both are matrices of what is known of the way, seen from its target: the place where it begins and the first
+        commands. Shapes (2, first + 1) and ((first + 2) · substeps, first + 1): a place for each substep.
         """
-        commands_of, places_of = self._maps[begun.shape[1]]
-        # In a frame at the target the way is linear in the place and the first commands.
-        known = np.concatenate([np.broadcast_to(place, (len(begun), 1, 2)), begun], axis=1) - target
-        commands = commands_of @ known + target
-        commands = np.concatenate([begun, commands[:, begun.shape[1] :]], axis=1)
-        given = self.allowed(commands)
-        return commands[given], places_of @ known[given] + target
+        return self._laws[first]
 
     def straight(self, place: Array, target: Array) -> Array | None:
         """The fewest commands (m, 2) that lead straight from rest to rest; None if 12 are too few."""
@@ -76,8 +74,7 @@ class Agent:
         return np.array(of_state[1:]), np.array(of_commands[1:])
 
     @cached_property
-    def _maps(self) -> tuple[tuple[Array, Array], ...]:
-        """For 0, 1 and 2 first commands: commands and places as matrices of (place, first commands)."""
+    def _laws(self) -> tuple[tuple[Array, Array], ...]:
         made = []
         for first in range(3):
             of_state, of_commands = self.response(first + 2)
@@ -85,7 +82,7 @@ class Agent:
             last = -np.linalg.solve(of_commands[-1][:, first:], known)
             commands = np.vstack([np.eye(first + 1)[1:], last])
             places = np.outer(of_state[:, 0, 0], np.eye(first + 1)[0]) + of_commands[:, 0] @ commands
-            made.append((commands, places))
+            made.append((np.ascontiguousarray(last), np.ascontiguousarray(places)))
         return tuple(made)
 
     @cached_property

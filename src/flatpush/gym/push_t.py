@@ -20,11 +20,13 @@ from ..planning.sliding import Sequence, SlideLibrary, SlideSearch, slide_librar
 from ..problem import Object
 from ..simulation.plant import Plant
 from .agent import Agent
+from .kernels import shortest_clear
 
 PIXEL = 1e-3  # [m]
 SCALE = 0.030  # the T is drawn with it [m]
 BAR = ((-2 * SCALE, 0.0), (2 * SCALE, SCALE))  # lower left and upper right corners
 STEM = ((-SCALE / 2, SCALE), (SCALE / 2, 4 * SCALE))
+BOXES = np.array([BAR, STEM])
 CENTRE_OF_GRAVITY = (0.0, 1.5 * SCALE)  # mean of both parts' centres, as the environment sets it
 MOMENT = 3000 * PIXEL**2  # by mass [m²]
 TIP = 0.015
@@ -195,11 +197,10 @@ class PushTPolicy:
         """The fewest commands from rest to rest at a target on which the disc keeps clear of the T: two to four."""
         room = min(CLEAR, float(_gap(pose, agent)) - TIP - TOUCHING)  # it may begin at the T
         for begun in self._first_commands:
-            commands, way = self.agent.ways(agent, target, begun)
-            clear = np.all(_gap(pose, way) - TIP >= room, axis=1)
-            if np.any(clear):
-                lengths = np.sum(np.linalg.norm(np.diff(way[clear], axis=1), axis=-1), axis=1)
-                return commands[clear][np.argmin(lengths)]
+            laws = self.agent.laws(begun.shape[1])
+            k = shortest_clear(*laws, agent, target, begun, ROOM, pose, BOXES, TIP + room)
+            if k >= 0:
+                return self.agent.way(agent, target, begun[k])
         return None
 
 
@@ -229,7 +230,7 @@ def check_environment(env: Environment) -> None:
 def _gap(pose: Array, points: Array) -> Array:
     """Distances of points (..., 2) from the T at a pose; 0 inside."""
     local = transform(inverse(pose), points)
-    gaps = [np.linalg.norm(local - np.clip(local, *box), axis=-1) for box in (BAR, STEM)]
+    gaps = [np.linalg.norm(local - np.clip(local, *box), axis=-1) for box in BOXES]
     return np.minimum(*gaps)
 
 
