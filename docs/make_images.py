@@ -31,6 +31,51 @@ PICTURES: dict[str, list[str]] = {
     ],
 }
 
+# Of the live page: what is done on it before the picture is taken, the size of the window, and whether it is dark.
+BLOCK = "for (let k = 0; k < 2; k++) document.getElementById('add').click(); flatpush.model.select('');"
+PAGES: dict[str, tuple[str, tuple[int, int], bool]] = {
+    "page.png": ("", (1280, 720), False),
+    "page_dark.png": (BLOCK, (1000, 700), True),
+}
+
+
+def photograph(name: str) -> None:
+    """A picture of flatpush view in headless Chromium."""
+    import shutil
+    import signal
+    import time
+
+    from selenium import webdriver
+
+    script, (width, height), dark = PAGES[name]
+    served = subprocess.Popen(
+        [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser", "--port", "0",
+         str(EXAMPLES / "triangle.yaml")],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert served.stderr is not None
+    link = served.stderr.readline().split()[-1]
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
+        options.add_argument(flag)
+    browser = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
+    try:
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+        browser.get(link)
+        for step in ("", script, "flatpush.player.show(0.3 * flatpush.player.duration);"):
+            browser.execute_script(step)
+            while not browser.execute_script("return window.flatpush && flatpush.answered && !flatpush.busy"):
+                time.sleep(0.1)
+        browser.save_screenshot(str(IMAGES / name))
+    finally:
+        browser.quit()
+        served.send_signal(signal.SIGINT)
+        served.wait(10)
+
 
 def draw(name: str) -> None:
     """Runs the commands of one picture; a command that fails ends the program."""
@@ -43,10 +88,14 @@ def draw(name: str) -> None:
 
 
 if __name__ == "__main__":
-    wanted = sys.argv[1:] or list(PICTURES)
-    unknown = [name for name in wanted if name not in PICTURES]
+    known = [*PICTURES, *PAGES]
+    wanted = sys.argv[1:] or known
+    unknown = [name for name in wanted if name not in known]
     if unknown:
-        sys.exit(f"no such picture: {', '.join(unknown)}; there are {', '.join(PICTURES)}")
+        sys.exit(f"no such picture: {', '.join(unknown)}; there are {', '.join(known)}")
     for name in wanted:
         print(name, flush=True)
-        draw(name)
+        if name in PAGES:
+            photograph(name)
+        else:
+            draw(name)

@@ -10,7 +10,7 @@ import typer
 
 from .. import compiling
 from ..errors import FlatpushError
-from . import describe, experiment, export, identify, init, plan, run, simulate, track, verify
+from . import describe, experiment, export, identify, init, plan, run, simulate, track, verify, view
 from .common import CompilingNotice
 
 app = typer.Typer(
@@ -31,6 +31,7 @@ app.command("track")(track.command)
 app.command("run")(run.command)
 app.command("identify")(identify.command)
 app.command("init")(init.command)
+app.command("view")(view.command)
 app.command("experiment")(experiment.command)
 
 

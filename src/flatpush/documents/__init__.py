@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .outline_reader import OutlineNote, outline_note
     from .pairs_file import BadRow, PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
-    from .reading import read_mapping
+    from .reading import mapping_of, read_mapping
     from .robot_log import RobotLog, RobotRun, load_robot_log
     from .rollout_file import save_rollouts
     from .runs_file import save_runs
@@ -44,6 +44,7 @@ __all__ = [
     "load_robot_log",
     "load_scene",
     "load_surface",
+    "mapping_of",
     "outline_note",
     "own_columns",
     "parse_plan",
@@ -84,6 +85,7 @@ _HOME = {
     "load_robot_log": "robot_log",
     "load_scene": "scene_reader",
     "load_surface": "surface_file",
+    "mapping_of": "reading",
     "outline_note": "outline_reader",
     "parse_plan": "plan_file",
     "parse_scene": "scene_reader",

@@ -44,8 +44,12 @@ def read_mapping(
         InputError: if the file cannot be read, is empty, binary, cut off or of more than so many bytes, holds a list
             of more than so many entries or a key twice, or uses YAML's aliases or tags.
     """
-    source = os.fspath(path)
-    text = read_text(path, most)
+    return mapping_of(read_text(path, most), os.fspath(path), longest)
+
+
+def mapping_of(text: str, source: str = "", longest: int = MOST_ENTRIES) -> dict[str, object]:
+    """The document in a text, as read_mapping reads it from a file of the name `source`; a list in it has at most
+    `longest` entries (a number)."""
     kind = Path(source).suffix.lower()
     is_json = kind == ".json" or (kind not in (".yaml", ".yml") and text.lstrip().startswith("{"))
     value = None

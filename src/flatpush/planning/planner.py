@@ -89,6 +89,13 @@ class Planner:
         few.scene = self.scene if _crowded(self.scene) else replace(self.scene, planning=planning)
         return [few.plan(start) for start in starts]
 
+    def moved(self, start: ArrayLike, goal: ArrayLike, progress: Progress | None = None) -> "Planner":
+        """The same pushes, worked out once, from another start to another goal, poses X_WO (3,)."""
+        other = copy(self)
+        other.scene = replace(self.scene, start=start, goal=goal)
+        other._progress = progress
+        return other
+
     def improving(self, start: ArrayLike | None = None) -> Iterator[Plan]:
         """Plans that get better, the first one at once; plan() is the last of them."""
         for answer in self.answers(start):
@@ -153,7 +160,7 @@ class Planner:
 
     def _candidates(self, scene: Scene) -> Iterator[Found]:
         """The cheapest single push, then what the refinement finds; all words of the push if it is the only one."""
-        endpoints = self._endpoints(scene)
+        endpoints = self.endpoints(scene)
         singles = direct_paths(self.fleet, scene.start_pose, endpoints)
         several = len(self.usable) > 1 or scene.wide_goal
         single = {"single_cost": singles[0].cost}
@@ -164,7 +171,7 @@ class Planner:
                 found.details.update(single)
                 yield found
 
-    def _endpoints(self, scene: Scene) -> Array:
+    def endpoints(self, scene: Scene) -> Array:
         """For every push where it best ends: the goal, or with the cheapest angle where any will do, shape (k, 3)."""
         if not scene.free_angle:
             return np.tile(scene.goal_pose, (self.fleet.size, 1))

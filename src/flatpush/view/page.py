@@ -35,7 +35,7 @@ def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
     """The page: the plan's traces, object and fingers in motion, play, pause, scrub, speed, keyboard."""
     traces = trace_pushes(plan)
     box = view_box(plan, traces, rollouts)
-    data = _data(plan, traces)
+    data = plan_data(plan, traces)
     # "<" must not stand in a script, whatever a name in the scene contains.
     script_data = json.dumps(data, separators=(",", ":"), ensure_ascii=True).replace("<", "\\u003c")
     page = Template(files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
@@ -52,7 +52,7 @@ def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
     )
 
 
-def _data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
+def plan_data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
     """What the script needs: samples of poses (mm, rad; y up), and the segments with their turns."""
     timeline = Timeline.of(plan)
     segments: list[dict[str, object]] = []

@@ -18,6 +18,7 @@ ANGLES = 24  # at a goal with a free angle, that seeds end with; the descent mov
 THOROUGH = 4  # repeats of a descent after which a plan also slides to the cheapest end
 SLIDES = 30
 PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the way to a side of the goal's box
+FOLLOWING = 40  # steps of a descent from a plan nearby
 SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
@@ -166,6 +167,19 @@ class Sequences:
             if found is before:
                 break
         return found
+
+    def following(self, known: Candidate) -> Candidate:
+        """The arcs of a plan for a start and a goal nearby, led to these and downhill; infinite if that cannot be.
+
+        Its switch poses alone would not do: good plans have few arcs, and those between poses a little off are others.
+        """
+        pushes, poses = known.pushes, known.poses.copy()
+        _, words = self.chain(pushes, poses)
+        poses[0], poses[-1, : 2 if self.free else 3] = self.start, self.goal[: 2 if self.free else 3]
+        work = Work.of(words, poses, self.least, float(self.fleet.radius[pushes[0]]), self.free)
+        if not descend(work, self.cars, pushes, words, poses, FOLLOWING):
+            return Candidate(np.inf, pushes, poses)
+        return self.descend(Candidate(np.inf, pushes, poses), 2, FOLLOWING)
 
     def replanning(self, found: Candidate) -> float:
         """Mean cost when every leg but the first starts off its switch pose, over sixteen fixed displacements.

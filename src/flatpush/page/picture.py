@@ -1,0 +1,105 @@
+"""What the page draws of a plan, and what it says about it: the same traces, colours and words as the figures."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..geometry.pose import Array
+from ..planning.options import PushOption
+from ..problem import Certificate, Plan
+from ..view import palette, words
+from ..view.page import plan_data
+from ..view.table import MM
+from ..view.trace import PushTrace, fingertips, trace_pushes
+
+COLOURS = 48  # pushes of one plan whose colours the page is told
+
+
+def picture(plan: Plan, options: Sequence[PushOption] = ()) -> dict[str, object]:
+    """A plan as plain values: motion and paths [mm, rad], numbers in words, and every push that was considered."""
+    found: dict[str, object] = {
+        "status": plan.status,
+        "title": words.plan_title(plan),
+        "subtitle": words.plan_subtitle(plan),
+        "places": [_place(option) for option in options],
+        "planning_time": plan.run.get("planning_time"),
+    }
+    if plan.status != "solved":
+        return found | {"reason": plan.reason}
+    traces = trace_pushes(plan)
+    certificate = plan.certificate
+    return found | {
+        "cost": words.cost_text(plan),
+        "duration": plan.duration,
+        "motion": plan_data(plan, traces),
+        "traces": [_trace(trace) for trace in traces],
+        "goal": _mm(plan.goal_pose * [MM, MM, 1.0], 3),
+        "proved": [] if certificate is None or math.isnan(certificate.goal_error[0]) else proved(certificate),
+        "warnings": [] if certificate is None else list(certificate.warnings),
+    }
+
+
+def proved(certificate: Certificate) -> list[tuple[str, str]]:
+    """What a certificate states, as names and values in words."""
+    x, y, turn = certificate.goal_error
+    place, angle = MM * math.hypot(x, y), math.degrees(abs(turn))
+    near = "<0.001 mm" if place < 0.001 else f"{place:.3f} mm"
+    rows = [("goal met within", f"{near}, <0.001°" if angle < 0.001 else f"{near}, {angle:.3f}°")]
+    if certificate.friction_margin is not None:
+        degrees = certificate.friction_margin_degrees
+        as_share = "" if degrees is None else f" ({degrees:.1f}°)"
+        rows.append(("friction margin", f"{_percent(certificate.friction_margin)} of μ{as_angle}"))
+    for name, value in (
+        ("both contacts", certificate.composite_margin),
+        ("spacing margin", certificate.spacing_margin),
+        ("curvature margin", certificate.curvature_margin),
+    ):
+        if value is not None:
+            rows.append((name, _percent(value) + (" of μ" if name.startswith("both") else "")))
+    if certificate.growth is not None:
+        rows.append(("a small error grows", f"{certificate.growth:.3g}-fold"))
+    if certificate.clearance is not None:
+        rows.append(("clearance", f"{MM * certificate.clearance:.2f} mm"))
+    return rows
+
+
+def vocabulary() -> dict[str, object]:
+    """Colours and words of the figures, for the page."""
+    return {
+        "pushes": [palette.push_colour(k) for k in range(COLOURS)],
+        "start": words.START,
+        "goal": words.GOAL,
+        "flat": words.FLAT_PATH,
+        "fingers": words.FINGERS,
+        "alone": words.ALONE,
+        "centre": words.CENTRE,
+    }
+
+
+def _trace(trace: PushTrace) -> dict[str, object]:
+    return {
+        "name": trace.segment.push,
+        "label": words.push_label(trace.number, trace.segment, True),
+        "word": trace.segment.word,
+        "ghosts": _mm(trace.marks * [MM, MM, 1.0], 4),
+        "tips": _mm(MM * fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2), 2),
+        "flat": None if trace.flat_path is None else _mm(MM * trace.flat_path, 2),
+    }
+
+
+def _place(option: PushOption) -> dict[str, object]:
+    """Where a push is on the object, in O [mm], and why it is refused."""
+    return {
+        "name": option.push.name,
+        "at": _mm(MM * np.asarray(option.push.at.point), 3),
+        "refusal": option.refusal,
+    }
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %" if math.isfinite(value) else "none"
+
+
+def _mm(values: Array, digits: int) -> list[object]:
+    return np.round(np.asarray(values, dtype=float) + 0.0, digits).tolist()

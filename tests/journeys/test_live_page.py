@@ -1,0 +1,537 @@
+"""flatpush view as a user meets it: the server from outside, and the page in headless Chromium."""
+
+import itertools
+import json
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
+pytest.importorskip("starlette", reason="the server is in the extra `page`")
+webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+COMMAND = [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser"]
+DESK, TABLET = (1280, 720), (820, 1180)
+PATIENCE = 60  # for an answer on a busy machine [s]
+
+
+class Served:
+    """A server in a process of its own, and what it has said."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen(
+            [*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.said = ""
+        while "token=" not in self.said:
+            line = self.process.stderr.readline()
+            assert line, self.said
+            self.said += line
+        self.link = re.search(r"http://\S+", self.said)[0]
+        self.host = self.link.split("/")[2]
+        self.token = self.link.split("token=")[1]
+
+    def get(self, path, **headers):
+        """Status and headers of an answer."""
+        request = urllib.request.Request(f"http://{self.host}{path}", headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+                return answer.status, answer.headers, answer.read()
+        except urllib.error.HTTPError as error:
+            return error.code, error.headers, error.read()
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        self.process.wait(PATIENCE)
+        self.process.stderr.close()
+        self.process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def server():
+    found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
+    yield found
+    found.stop()
+
+
+@pytest.fixture
+def talk(server):
+    """Opens a WebSocket to the server as a page would, with other headers or another token if asked."""
+    from websockets.sync.client import connect
+
+    with ExitStack() as opened:
+
+        def start(token=None, host=server.host, **more):
+            more.setdefault("origin", f"http://{host}")
+            address = f"ws://{host}/live?token={server.token if token is None else token}"
+            home, port = server.host.split(":")
+            there = opened.enter_context(socket.create_connection((home, int(port))))
+            line = connect(
+                address, sock=there, open_timeout=PATIENCE, max_size=None, compression=None, **more
+            )
+            return opened.enter_context(line)
+
+        yield start
+
+
+def ask(line, number, kind, value):
+    line.send(json.dumps({"number": number, "kind": kind, "value": value}))
+
+
+def hear(line, kind):
+    """The next message of a kind."""
+    while True:
+        message = json.loads(line.recv(PATIENCE))
+        if message["kind"] == kind:
+            return message
+
+
+def test_only_who_has_the_link_gets_the_page(server):
+    status, headers, body = server.get(f"/?token={server.token}")
+    assert status == 200
+    assert b"<title>flatpush</title>" in body
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    for path in ("/", "/?token=wrong"):
+        assert server.get(path)[0] == 403
+    for path in ("/server.py", "/..%2fserver.py", "/%2e%2e/server.py", "/nothing.js"):
+        assert server.get(path)[0] == 404
+    assert server.get(f"/?token={server.token}", Host="evil.example")[0] == 403
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"token": "wrong"},
+        {"token": ""},
+        {"origin": "http://evil.example"},
+        {"origin": None},
+        {"host": "evil.example"},  # a name of theirs that leads to this machine
+    ],
+)
+def test_a_foreign_page_gets_no_connection(talk, wrong):
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus, match="403"):
+        talk(**wrong)
+
+
+def test_a_message_is_answered_or_refused_and_the_next_one_still_counts(server, talk):
+    line = talk()
+    scene = hear(line, "hello")["scene"]
+    line.send("{")
+    assert "a message is JSON" in hear(line, "error")["reason"]
+    ask(line, 1, "plan", {"flatpush": "scene/1"})
+    answer = hear(line, "plan")
+    assert (answer["status"], answer["number"]) == ("refused", 1)
+    assert "object" in answer["reason"]
+    scene["object"]["outline"] = {"file": "/etc/hostname"}
+    ask(line, 2, "plan", scene)
+    assert "names no files" in hear(line, "plan")["reason"]
+    other = talk()  # a second tab
+    whole = hear(other, "hello")["scene"]
+    ask(other, 1, "plan", whole)
+    assert hear(other, "plan")["status"] == "solved"
+    assert hear(other, "done")["number"] == 1
+
+
+def flood(line, messages):
+    """Sends all, and listens until the other side has had enough."""
+    for message in messages:
+        line.send(message)
+    while True:
+        line.recv(PATIENCE)
+
+
+def test_too_much_and_too_often_ends_the_connection_alone(server, talk):
+    from websockets.exceptions import ConnectionClosed
+
+    line = talk()
+    hear(line, "hello")
+    with pytest.raises(ConnectionClosed) as ended:
+        flood(line, ["x" * 4_000_000])
+    assert ended.value.rcvd.code == 1009
+    line = talk()
+    with pytest.raises(ConnectionClosed) as ended:
+        flood(line, ["{}"] * 2000)
+    assert ended.value.rcvd.code == 1008
+    assert hear(talk(), "hello")["scene"]["object"]["name"] == "triangle"
+
+
+def test_a_port_that_is_taken_is_not_in_the_way_and_ctrl_c_ends_everything():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        served = Served("--port", str(port))
+        assert f"port {port} is in use; this is port" in served.said
+        children = subprocess.run(
+            ["ps", "-o", "pid=", "--ppid", str(served.process.pid)], capture_output=True, text=True
+        ).stdout.split()
+        served.process.send_signal(signal.SIGINT)
+        assert served.process.wait(PATIENCE) == 130
+    assert "Traceback" not in served.process.stderr.read()
+    served.stop()
+    for _ in range(50):
+        left = [pid for pid in children if Path(f"/proc/{pid}").exists()]
+        if not left:
+            break
+        time.sleep(0.1)
+    assert not left
+
+
+def test_an_address_of_another_machine_is_refused_in_words():
+    ended = subprocess.run(
+        [*COMMAND, "--host", "203.0.113.9"], capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert ended.returncode == 2
+    assert "nothing can be served at 203.0.113.9" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+# ---- in a browser ----
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    program, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if program is None or driver is None:
+        pytest.skip("no browser: needs chromium and chromedriver (Debian: chromium, chromium-driver)")
+    options = webdriver.ChromeOptions()
+    options.binary_location = program
+    for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    chromium = webdriver.Chrome(options, webdriver.ChromeService(driver))
+    chromium.downloads = tmp_path_factory.mktemp("downloads")
+    chromium.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(chromium.downloads)}
+    )
+    yield chromium
+    chromium.quit()
+
+
+@pytest.fixture
+def page(browser, server):
+    """The page at a size of the window, with its first plan."""
+    found = Page(browser, server)
+    yield found
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    asked = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    asked += [m["params"]["url"] for m in messages if m["method"] == "Network.webSocketCreated"]
+    local = ("data:", "blob:", "about:", f"http://{server.host}/", f"ws://{server.host}/")
+    assert [url for url in asked if not url.startswith(local)] == []
+    assert browser.get_log("browser") == []
+
+
+class Page:
+    def __init__(self, browser, server):
+        self.browser, self.server = browser, server
+        for log in ("browser", "performance"):
+            browser.get_log(log)
+        self.open()
+
+    def open(self, size=DESK, touch=False, link=None):
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": touch}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        self.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": touch})
+        self.browser.get("about:blank")
+        self.browser.get(link or self.server.link)
+        self.wait("window.flatpush && flatpush.answered > 0")
+        self.settle()
+
+    def js(self, code, *arguments):
+        return self.browser.execute_script(code, *arguments)
+
+    def wait(self, condition):
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        WebDriverWait(self.browser, PATIENCE, 0.05).until(lambda _: self.js(f"return Boolean({condition})"))
+
+    def settle(self):
+        self.wait("!flatpush.busy")
+
+    def middle(self, selector):
+        return self.js(
+            "const box = document.querySelector(arguments[0]).getBoundingClientRect();"
+            "return [box.x + box.width / 2, box.y + box.height / 2];",
+            selector,
+        )
+
+    def mouse(self, kind, x, y, clicks=1):
+        event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": clicks}
+        self.browser.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+
+    def drag(self, start, end, steps=12, drop=True):
+        self.mouse("mousePressed", *start)
+        for k in range(1, steps + 1):
+            self.mouse("mouseMoved", *(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
+        if drop:
+            self.mouse("mouseReleased", *end)
+            self.settle()
+
+    def press(self, *keys):
+        self.browser.switch_to.active_element.send_keys(*keys)
+
+    def click(self, name):
+        self.browser.find_element("id", name).click()
+
+    def text(self, name):
+        return self.browser.find_element("id", name).text
+
+    @property
+    def scene(self):
+        return self.js("return flatpush.model.scene")
+
+    @property
+    def plan(self):
+        return self.js("return flatpush.model.plan")
+
+
+def test_the_start_is_dragged_and_the_plan_follows(page):
+    before, unit = page.scene["start"], page.js("return flatpush.table.view.unit")
+    x, y = page.middle("#start .body")
+    page.drag((x, y), (x + 100, y - 40), drop=False)
+    page.wait("flatpush.latencies.length > 0")  # a path before the button is let go
+    page.mouse("mouseReleased", x + 100, y - 40)
+    page.settle()
+    after = page.scene["start"]
+    assert after == pytest.approx([before[0] + 100 * unit, before[1] + 40 * unit, before[2]], abs=0.02)
+    first = page.plan["motion"]["object"][0]
+    assert first[:2] == pytest.approx(after[:2], abs=1e-3)
+    assert page.plan["proved"]
+    assert page.text("title").startswith("triangle: ")
+    assert page.text("cost").endswith(" mm")
+    page.click("undo")
+    page.settle()
+    assert page.scene["start"] == before
+    page.click("redo")
+    page.settle()
+    assert page.scene["start"] == after
+
+
+def test_the_goal_is_turned_about_its_middle(page):
+    before = page.middle("#goal .body")
+    x, y = page.middle("#goal .handle .see")
+    hub = page.js(
+        "const m = document.querySelector('#goal path:nth-child(2)');"
+        "const p = m.getPointAtLength(0).matrixTransform(m.getScreenCTM()); return [p.x, p.y];"
+    )
+    reach = x - hub[0]
+    page.drag((x, y), (hub[0], hub[1] - reach))
+    pose = page.scene["goal"]
+    assert pose[2] == pytest.approx(90, abs=1)
+    assert pose[:2] == pytest.approx([0, 0], abs=0.01)  # the middle of this triangle is its origin
+    x, y, turn = page.plan["motion"]["object"][-1]
+    assert (x, y) == pytest.approx((0, 0), abs=0.01)
+    assert page.js("return Math.cos(arguments[0])", turn) == pytest.approx(0, abs=0.02)
+    assert before != page.middle("#goal .body")
+
+
+def test_an_obstacle_is_added_blocks_is_moved_and_removed(page):
+    from selenium.webdriver.common.keys import Keys
+
+    page.press("a")
+    page.settle()
+    assert len(page.scene["workspace"]["obstacles"]) == 1
+    assert page.plan["status"] == "solved"
+    assert "clearance" in dict(page.plan["proved"])
+    page.drag(page.middle("#obstacles .body"), page.middle("#goal .body"))
+    assert "at the goal the object overlaps obstacle 0" in page.text("reason")
+    assert page.text("cost") == "–"
+    page.press("r")
+    corners = page.scene["workspace"]["obstacles"][0]
+    assert len({round(x) for x, _ in corners}) == 4  # it stands askew
+    page.press(Keys.DELETE)
+    page.settle()
+    assert page.scene["workspace"]["obstacles"] == []
+    assert page.plan["status"] == "solved"
+
+
+def test_a_corner_of_an_obstacle_is_moved_and_one_is_put_between(page):
+    page.press("a")
+    page.settle()
+    square = page.scene["workspace"]["obstacles"][0]
+    x, y = page.middle('#handles [data-part="corner:2"] .see')
+    page.drag((x, y), (x + 20, y - 20))
+    moved = page.scene["workspace"]["obstacles"][0]
+    assert [k for k in range(4) if moved[k] != square[k]] == [2]
+    x, y = page.middle('#handles [data-part="edge:0"] .see')
+    page.drag((x, y), (x, y + 15))
+    assert len(page.scene["workspace"]["obstacles"][0]) == 5
+
+
+def test_a_drawing_is_dropped_and_the_link_brings_it_back(page):
+    """The file arrives as a browser hands it over; the drop itself is made in the page."""
+    drawing = '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="40mm" viewBox="0 0 60 40">'
+    drawing += '<path d="M5 5H55V35Z"/></svg>'
+    drop = (
+        "const data = new DataTransfer(); data.items.add(new File([arguments[1]], arguments[0]));"
+        "document.dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));"
+    )
+    page.js(drop, "wedge.svg", drawing)
+    page.wait("flatpush.model.scene.object.name === 'wedge'")
+    page.settle()
+    assert page.scene["pushes"] == "auto"
+    assert len(page.scene["object"]["outline"]) == 3
+    assert page.text("title").startswith("wedge: ")
+    page.wait("location.hash.length > 100")
+    time.sleep(0.5)  # the link is written a moment after the last change
+    link, scene = page.browser.current_url, page.scene
+    page.js(drop, "notes.txt", "nothing")
+    page.wait("!document.getElementById('banner').hidden")
+    assert "no kind of file" in page.text("banner")
+    assert page.scene == scene
+    page.open(link=link)
+    assert page.scene == scene
+    assert page.text("title").startswith("wedge: ")
+
+
+def test_space_plays_and_the_arrows_nudge(page):
+    from selenium.webdriver.common.keys import Keys
+
+    page.js("document.getElementById('speed').value = 8")
+    page.press(" ")
+    page.wait("flatpush.player.now > 1")
+    page.press(" ")
+    assert page.text("play") == "Play"
+    x, y, _ = page.js("return flatpush.player.state(flatpush.player.now).object")
+    shown = page.js(
+        "const m = document.getElementById('object').transform.baseVal.consolidate().matrix; return [m.e, m.f];"
+    )
+    assert shown == pytest.approx([x, y], abs=1e-3)
+    page.press(Keys.END)
+    assert page.text("time").split(" s of ")[0] == page.text("time").split(" s of ")[1].removesuffix(" s")
+    page.js("document.getElementById('start').focus()")
+    page.press(Keys.ARROW_RIGHT)
+    page.press(Keys.SHIFT, Keys.ARROW_UP)
+    page.settle()
+    assert page.scene["start"] == [-119, 70, -60]
+    page.press("?")
+    assert page.browser.find_element("id", "keys").is_displayed()
+    assert "undo" in page.text("keylist")
+    page.press(Keys.ESCAPE)
+
+
+def test_sliders_and_numbers_say_the_same_and_change_the_plan(page):
+    cost = page.text("cost")
+    page.js(
+        "const s = document.getElementById('object-friction-slider'); s.value = 0.6;"
+        "s.dispatchEvent(new Event('input')); s.dispatchEvent(new Event('change'));"
+    )
+    page.settle()
+    assert page.js("return document.getElementById('object-friction').value") == "0.6"
+    assert page.scene["object"]["friction"] == 0.6
+    assert page.text("cost") != cost
+    page.js(
+        "const s = document.getElementById('pusher-spacing'); s.value = 1; s.dispatchEvent(new Event('input'));"
+    )
+    page.settle()
+    assert "pusher.spacing: the fingers overlap" in page.text("reason")
+
+
+def test_what_is_saved_can_be_planned_and_verified(page):
+    import flatpush as fp
+
+    for what, name in (("scene", "triangle.yaml"), ("plan", "triangle.json"), ("figure", "triangle.svg")):
+        page.js(
+            "const s = document.getElementById('save'); s.value = arguments[0]; s.dispatchEvent(new Event('change'));",
+            what,
+        )
+        file = page.browser.downloads / name
+        for _ in range(10 * PATIENCE):
+            if file.exists():
+                break
+            time.sleep(0.1)
+        assert file.exists(), what
+    assert fp.load_scene(page.browser.downloads / "triangle.yaml").object.name == "triangle"
+    assert fp.verify(fp.load_plan(page.browser.downloads / "triangle.json")).ok
+    assert (page.browser.downloads / "triangle.svg").read_text(encoding="utf-8").startswith("<svg")
+
+
+def test_an_outline_is_drawn_by_clicking(page):
+    page.click("draw")
+    box = page.browser.find_element("id", "table").rect
+    for dx, dy in ((200, 300), (320, 300), (320, 380), (200, 380)):
+        for kind in ("mousePressed", "mouseReleased"):
+            page.mouse(kind, box["x"] + dx, box["y"] + dy)
+    from selenium.webdriver.common.keys import Keys
+
+    page.press(Keys.ENTER)
+    page.settle()
+    unit = page.js("return flatpush.table.view.unit")
+    outline = page.scene["object"]["outline"]
+    wide, high = (max(p[k] for p in outline) - min(p[k] for p in outline) for k in (0, 1))
+    assert (wide, high) == pytest.approx((120 * unit, 80 * unit), abs=0.1)
+    assert page.plan["status"] == "solved"
+
+
+def test_a_finger_on_a_tablet_drags_the_goal(page):
+    page.open(TABLET, touch=True)
+    before, unit = page.scene["goal"], page.js("return flatpush.table.view.unit")
+    x, y = page.middle("#goal .body")
+
+    def touch(kind, x, y):
+        points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
+        page.browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    for kind, k in (("touchStart", 0), ("touchMove", 30), ("touchMove", 60), ("touchEnd", 60)):
+        touch(kind, x, y - k)
+    page.settle()
+    assert page.scene["goal"] == pytest.approx([before[0], before[1] + 60 * unit, 0], abs=0.05)
+
+
+@pytest.mark.parametrize("size", [DESK, (1000, 700), TABLET])
+def test_nothing_is_cut_off_and_every_control_has_a_name(page, size):
+    page.open(size)
+    wide, high = page.js(
+        "const page = document.documentElement; return [page.scrollWidth, page.scrollHeight];"
+    )
+    assert (wide, high) == size
+    assert page.js("const p = document.getElementById('panel'); return p.scrollWidth <= p.clientWidth;")
+    table = page.browser.find_element("id", "table").rect
+    assert table["width"] * table["height"] > 0.35 * size[0] * size[1]
+    boxes = page.js(
+        "return [...document.querySelectorAll('header button, header select, footer button, footer select')]"
+        ".map((n) => { const b = n.getBoundingClientRect(); return [n.id, b.left, b.top, b.right, b.bottom]; });"
+    )
+    for name, left, top, right, bottom in boxes:
+        assert left >= 0, name
+        assert right <= size[0], name
+        assert bottom - top >= 24, name
+    for one, other in itertools.combinations(boxes, 2):
+        assert one[3] <= other[1] or other[3] <= one[1] or one[4] <= other[2] or other[4] <= one[2]
+    tree = page.browser.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    roles = {"button", "slider", "spinbutton", "combobox", "checkbox"}
+    controls = [n for n in tree if not n["ignored"] and n["role"]["value"] in roles]
+    assert len(controls) > 25
+    assert [n["role"]["value"] for n in controls if not n["name"]["value"].strip()] == []
+
+
+def test_a_lost_connection_is_said_and_taken_up_again(page):
+    page.js("flatpush.connection.wait = 1000; flatpush.connection.socket.close()")
+    page.wait("!document.getElementById('banner').hidden")
+    assert "connection is lost" in page.text("banner")
+    page.js("document.getElementById('start').focus()")
+    page.press("r")
+    page.wait("document.getElementById('banner').hidden")
+    page.settle()
+    assert page.scene["start"][2] == -45
+    assert page.plan["motion"]["object"][0][2] == pytest.approx(page.js("return -Math.PI / 4"), abs=1e-4)
+
+
+def test_the_page_weighs_little():
+    static = Path(__file__).parents[2] / "src" / "flatpush" / "page" / "static"
+    assert sum(file.stat().st_size for file in static.iterdir()) < 250_000
