@@ -227,6 +227,7 @@ def test_of_the_requests_of_a_client_the_newest_wins(document):
     thread.start()
     answers = []
     while sum(answer["kind"] == "done" for _, _, answer in answers) < 2:
+        assert here.poll(60), "the worker is gone"
         client, number, answer = here.recv()
         if client:
             answers.append((client, number, answer))

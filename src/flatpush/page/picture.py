@@ -48,8 +48,8 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
     rows = [("goal met within", f"{near}, <0.001°" if angle < 0.001 else f"{near}, {angle:.3f}°")]
     if certificate.friction_margin is not None:
         degrees = certificate.friction_margin_degrees
-        as_share = "" if degrees is None else f" ({degrees:.1f}°)"
-        rows.append(("friction margin", f"{_percent(certificate.friction_margin)} of μ{as_angle}"))
+        share = "" if degrees is None else f" ({degrees:.1f}°)"
+        rows.append(("friction margin", f"{_percent(certificate.friction_margin)} of μ{share}"))
     for name, value in (
         ("both contacts", certificate.composite_margin),
         ("spacing margin", certificate.spacing_margin),

@@ -4,6 +4,7 @@ Messages in: (client, number, kind, value). Messages out: (client, number, mappi
 """
 
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -136,9 +137,13 @@ class _Worker:
                 if plan.status == "solved":
                     self._plan[client] = plan
                 yield {"kind": "plan", **picture(plan, options), "planning_time": spent}
+        except Superseded:
+            raise
         except FlatpushError as error:
-            key = getattr(error, "key", "")
-            yield {"kind": "plan", "status": "refused", "reason": str(error), "key": key}
+            yield {"kind": "plan", "status": "refused", "reason": str(error)}
+        except Exception as error:  # a mistake of ours: the page lives on, and says it
+            traceback.print_exc()
+            yield {"kind": "plan", "status": "refused", "reason": f"the planner failed: {error!r}"}
 
     def _tell_compiling(self, work: compiling.Work) -> None:
         self._requests.send(

@@ -90,7 +90,7 @@ class Planner:
         return [few.plan(start) for start in starts]
 
     def moved(self, start: ArrayLike, goal: ArrayLike, progress: Progress | None = None) -> "Planner":
-        """The same pushes, worked out once, from another start to another goal, poses X_WO (3,)."""
+        """The same pushes, worked out once, from another start to another goal, poses X_WO (3,), with a progress."""
         other = copy(self)
         other.scene = replace(self.scene, start=start, goal=goal)
         other._progress = progress
