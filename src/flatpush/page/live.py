@@ -14,7 +14,7 @@ from ..errors import FlatpushError
 from ..planning import Planner
 from ..planning.among_obstacles import Progress
 from ..planning.assembly import assemble, car_of
-from ..planning.empty_table import ROUND, direct_paths, refined_paths
+from ..planning.empty_table import direct_paths, refined_paths
 from ..planning.options import PushOption
 from ..planning.path import Path, pieces_of
 from ..planning.query import Query
@@ -90,8 +90,7 @@ class _Prepared:
             yield plan
             yield _certified(plan)
             break
-        rounds = 1 + max(1, scene.planning.iterations // ROUND)
-        for found in islice(refined_paths(scene, planner.fleet), 1, rounds + 1):
+        for found in islice(refined_paths(scene, planner.fleet), 1, None):
             if found.path.cost >= best * (1 - 1e-9):
                 continue
             try:
