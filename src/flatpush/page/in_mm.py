@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from ..documents import scene_document
 from ..documents.scene_reader import LENGTHS
@@ -13,13 +14,13 @@ DIGITS = 10  # that a number in millimetres is written with: no dust of the conv
 
 def scene_in_mm(scene: Scene) -> dict[str, object]:
     """The document of a scene, everything filled in, in mm and degrees (a surface stays in SI)."""
-    found = scene_document(scene)
+    found: dict[str, Any] = scene_document(scene)
     thing, pusher, planning = found["object"], found["pusher"], found["planning"]
     thing["outline"] = _mm(thing["outline"])
     if isinstance(thing["support"], dict):
         feet = thing["support"].get("points")
         thing["support"] = (
-            {"points": [[*_mm(foot[:2]), foot[2]] for foot in feet]} if feet else _mm(thing["support"])  # type: ignore[misc]
+            {"points": [[*_mm(foot[:2]), foot[2]] for foot in feet]} if feet else _mm(thing["support"])
         )
     if "uncertainty" in thing:
         thing["uncertainty"]["offset"] = _mm(thing["uncertainty"]["offset"])
@@ -66,13 +67,12 @@ def refuse_files(value: object, key: str = "") -> None:
             refuse_files(item, key)
 
 
-def _mm(value: object) -> object:
+def _mm(value: Any) -> Any:
     """Every number of a value in mm instead of m."""
     if isinstance(value, dict):
         return {key: _mm(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_mm(item) for item in value]
-    assert isinstance(value, int | float)
     return _clean(1000.0 * value)
 
 

@@ -37,7 +37,7 @@ def work(requests: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends, and with it the connection
     try:
         _Worker(requests).run()
-    except (EOFError, BrokenPipeError, ConnectionResetError, OSError):
+    except (EOFError, OSError):
         return
 
 
@@ -48,19 +48,26 @@ class _Worker:
         self._plan: dict[int, Plan] = {}  # the last that was solved
         self._going_on: dict[int, _Job] = {}
         self._waiting = set[int]()  # clients that have no answer yet
-        compiling.listen(self._tell_compiling)
         from .live import LivePlanner
 
         self._planner = LivePlanner()
 
     def run(self) -> None:
-        while True:
-            if not self._new:
-                self._take(None if not self._going_on else PAUSE)
-            if self._new:
-                self._begin(self._new.pop(next(iter(self._new))))
-            elif self._going_on:
-                self._go_on(next(iter(self._going_on.values())))
+        """Until the other end is closed, which raises EOFError or OSError."""
+        silence = compiling.listen(self._tell_compiling)
+        try:
+            while True:
+                self._serve()
+        finally:
+            silence()
+
+    def _serve(self) -> None:
+        if not self._new:
+            self._take(None if not self._going_on else PAUSE)
+        if self._new:
+            self._begin(self._new.pop(next(iter(self._new))))
+        elif self._going_on:
+            self._go_on(next(iter(self._going_on.values())))
 
     def _take(self, wait: float | None) -> None:
         """Takes what has come, after waiting for it so long [s], or until something comes."""
