@@ -1,7 +1,7 @@
 """The one door to numba: how a kernel is compiled, and by what it is recognised when it was compiled before.
 
-Nothing else imports numba, and kernel files are imported only when they are needed, so that reading a file, printing
-help or drawing never pays for a compiler.
+Nothing else imports numba, kernel_pipeline.py excepted, and kernel files are imported only when they are needed, so
+that reading a file, printing help or drawing never pays for a compiler.
 
 numba's own cache knows a kernel by its file alone: it does not notice that a function in another file changed, dies of
 a damaged file and needs a folder that it can write. Here a kernel is known by what it computes: its code, that of every
@@ -28,12 +28,13 @@ from numba.extending import intrinsic, overload
 
 from . import compiling, kernel_store
 from .formulas import CHOICES, FORMULAS
+from .kernel_pipeline import Within
 
 F = TypeVar("F", bound=Callable[..., object])
 
 _PLAIN = {"error_model": "numpy"}
 _LENT = {"_nrt": False}  # no counting of references: arrays are the caller's, and nothing is allocated
-_WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Within}
 _FUSED = {
     "fastmath": {"contract"}
 }  # contraction to multiply-and-add is the only liberty with floats that is taken
@@ -67,7 +68,7 @@ def inner(function: F) -> F:
 
 def block(function: F) -> F:
     """Decorates a piece of a loop that LLVM vectorises: inlined before it looks for vectors."""
-    return nb.njit(forceinline=True, **_PLAIN, **_FUSED)(function)
+    return nb.njit(forceinline=True, **_PLAIN, **_FUSED, **_WITHIN)(function)
 
 
 def shared(returns: object, *examples: object, fused: bool = False) -> Callable[[F], F]:
@@ -178,6 +179,9 @@ class _Kept(caching.NullCache):
         compiling.begin("", 0, quiet=True)
         try:
             name = self._name(sig, data.codegen)
+            data.library._ensure_finalized()
+            for environment in data._find_referenced_environments():  # of what was linked into it
+                data.codegen.set_env(environment.env_name, environment)
             if not data._asdict()["library"].has_dynamic_globals:
                 kernel_store.save(name, serialize.dumps(data._reduce()))
             kernel_store.release(name)

@@ -1,5 +1,6 @@
 """Compiled kernels: what they are recognised by, how they are kept, and the clock that does not count compiling."""
 
+import gc
 import io
 import os
 import subprocess
@@ -212,6 +213,22 @@ def test_the_clock_stands_still_between_begin_and_end(monkeypatch):
     assert compiling.clock() == before
     now[0] += 1
     assert compiling.clock() == before + 1
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_not_collected_between_begin_and_end_and_then_as_before(collects):
+    was = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        compiling.begin("a kernel", 2)
+        compiling.begin("a function in it", 0)
+        assert not gc.isenabled()
+        compiling.end()
+        assert not gc.isenabled()
+        compiling.end()
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if was else gc.disable)()
 
 
 def test_who_listens_hears_what_is_compiled_and_nothing_when_nothing_is(own_store):
