@@ -179,11 +179,10 @@ class _Kept(caching.NullCache):
         compiling.begin("", 0, quiet=True)
         try:
             name = self._name(sig, data.codegen)
-            data.library._ensure_finalized()
-            for environment in data._find_referenced_environments():  # of what was linked into it
-                data.codegen.set_env(environment.env_name, environment)
             if not data._asdict()["library"].has_dynamic_globals:
                 kernel_store.save(name, serialize.dumps(data._reduce()))
+            for environment in data._find_referenced_environments():  # of what was linked into it
+                data.codegen.set_env(environment.env_name, environment)
             kernel_store.release(name)
         finally:
             compiling.end()

@@ -33,12 +33,12 @@ class _LowerWithin(NativeLowering):
     _name = "lowering_within_kernels"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
+        library = state["library"] = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         entry = object().__reduce__  # numba wants a builtin to know the function by; nobody calls it
         state.cr = state.cr._replace(cfunc=entry)
-        state.targetctx.insert_user_function(entry, state.cr.fndesc, [state.library])
+        state.targetctx.insert_user_function(entry, state.cr.fndesc, [library])
         return True
 
 
@@ -67,7 +67,7 @@ def _remember_operators() -> None:
             found[key] = look_up(self, context, args, kws)
         return found[key]
 
-    BaseFunction.get_call_type = get_call_type
+    BaseFunction.get_call_type = get_call_type  # type: ignore[method-assign]
 
 
 _remember_operators()
