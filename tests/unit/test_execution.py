@@ -172,13 +172,38 @@ def test_what_a_robot_may_not_do_is_refused_before_the_first_command(short_plan,
         assert robot.sent == 0
 
 
+class Straight:
+    """An arm with one joint, that turns with x."""
+
+    speeds = np.array([1.0])
+
+    def unreachable(self, pose):
+        return "the elbow is straight" if pose[2] == 0 else ""
+
+    def joints(self, pose):
+        return np.array([20 * pose[0]])
+
+
 def test_an_arm_says_where_it_cannot_go(short_plan):
-    limits = replace(Limits(), unreachable=lambda pose: "the elbow is straight" if pose[2] == 0 else "")
+    limits = replace(Limits(), arm=Straight())
     with (
         DryRun(home_of(short_plan), limits) as robot,
         pytest.raises(OutOfLimits, match="the elbow is straight"),
     ):
         way(short_plan, robot)
+
+
+def test_joints_are_no_faster_than_they_can():
+    """A joint that turns by 20 rad a metre and at most by 1 rad/s allows 50 mm/s."""
+    poses = np.array([[0.0, 0.0, 0.01, 0.0], [0.01, 0.0, 0.01, 0.0], [0.02, 0.0, 0.01, 0.0]])
+    limits = replace(Limits(), arm=Straight(), acceleration=100.0)
+    course = Course(np.array([0.0, 0.201, 0.402]), poses, np.zeros(3, int), ("a reach",), (-1,))
+    course.check(limits)
+    quick = replace(course, times=np.array([0.0, 0.201, 0.4]))
+    with pytest.raises(
+        OutOfLimits, match=r"a reach, 0.40 s: the arm's first joint at 57.6 °/s is above 57.3 °/s"
+    ):
+        quick.check(limits)
 
 
 def test_turns_are_limited():
@@ -352,7 +377,7 @@ def test_robots_of_others_come_by_entry_points(short_plan, monkeypatch):
     )
     with open_robot("mine://?z=0.1", short_plan) as robot:
         assert robot.state().pose[2] == 0.1
-    with pytest.raises(fp.InputError, match=r"There are: dry-run, egm, mine, mujoco, sim"):
+    with pytest.raises(fp.InputError, match=r"There are: dry-run, egm, franka, mine, mujoco, sim, ur"):
         open_robot("yours", short_plan)
 
 

@@ -1,16 +1,17 @@
 """The arm of the physics cell: its joint angles against MuJoCo's forward kinematics, its limits, and a plan on it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, open_robot, run
-from flatpush.execution.cell.irb120 import LIMITS, Irb120
+from flatpush.execution.arms import ARMS
 from flatpush.execution.cell.model import FOOT, Physics, cell_xml, height_of
 from flatpush.execution.cell.robot import CellRobot, load
+
+IRB = ARMS["irb120"]
 
 
 @pytest.fixture(scope="module")
@@ -20,11 +21,14 @@ def short_plan(triangle):
     return fp.plan(fp.Scene(triangle, (-0.02, -0.05, 0.2), pusher=pusher, pushes=pushes))
 
 
-@pytest.mark.parametrize("base", [(0.36, 0.0, 0.2, 0.0), (0.2, -0.25, 0.1, 1.1)])
-def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, base):
+@pytest.mark.parametrize("name", ["irb120", "fr3"])
+@pytest.mark.parametrize("base", [(0.36, 0.0, 0.2, 0.0), (0.2, -0.3, 0.2, 1.1)])
+def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, name, base):
+    if name == "fr3":
+        pytest.importorskip("franky_sim")
     mujoco, scene = load(), short_plan.scene
-    # In the model the middle of the object is at 0, in Irb120 the table.
-    arm = Irb120(base, height_of(scene) / 2 + FOOT)
+    # In the model the middle of the object is at 0, for the arm the table.
+    arm = ARMS[name].placed(base, height=height_of(scene) / 2 + FOOT)
     model = mujoco.MjModel.from_xml_string(cell_xml(scene, short_plan.pushes[0].fingers, Physics(0.3), arm))
     data = mujoco.MjData(model)
     rng, tried = np.random.default_rng(4), 0
@@ -32,7 +36,7 @@ def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, base):
         if arm.unreachable(pose):
             continue
         tried += 1
-        data.qpos[-6:] = arm.joints(pose)
+        data.qpos[-len(arm.speeds) :] = arm.joints(pose)
         mujoco.mj_kinematics(model, data)
         tool = data.body("tool")
         assert np.allclose(tool.xpos, pose[:3], atol=1e-9)
@@ -55,26 +59,25 @@ def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, base):
 def test_what_the_arm_cannot_take_is_named(pose, rule):
     import re
 
-    assert re.search(rule, Irb120().unreachable(np.array(pose)))
+    assert re.search(rule, IRB.placed().unreachable(np.array(pose)))
 
 
 def test_a_wrist_that_would_be_straight_is_named():
-    low = Irb120((0.36, 0.0, 0.0, 0.0))
+    low = IRB.placed((0.36, 0.0, 0.0, 0.0))
     found = {low.unreachable(np.array([x, 0.0, 0.0, 0.0])) for x in np.linspace(-0.2, 0.1, 31)}
     assert "the arm's wrist is straight there" in found
     assert "" in found
-    assert LIMITS.shape == (6, 2)
 
 
 def test_a_plan_out_of_reach_is_refused_before_the_first_command(short_plan):
-    far = Irb120((0.62, 0.0, 0.2, 0.0))
+    far = IRB.placed((0.62, 0.0, 0.2, 0.0))
     home = np.array([-0.15, -0.1, 0.03, 1.5])
     with CellRobot(short_plan, arm=far, home=home) as robot:
         with pytest.raises(OutOfLimits, match=r" s: it is too far away from the arm"):
             run(short_plan, robot)
         assert np.allclose(robot.state().pose, home, atol=1e-6)
     with pytest.raises(fp.InputError, match="cannot begin behind the plan's first pose"):
-        CellRobot(short_plan, arm=Irb120((1.0, 0.0, 0.2, 0.0)))
+        CellRobot(short_plan, arm=IRB.placed((1.0, 0.0, 0.2, 0.0)))
 
 
 def test_the_arm_ends_where_the_tool_alone_does(short_plan):
@@ -98,6 +101,6 @@ def test_the_base_of_the_arm_is_the_tables_pose_in_it(short_plan):
     turned = open_robot("mujoco://irb120", short_plan, (0.0, 0.36, 0.2, 0.0))
     with turned:
         assert turned._data.qpos[-6] == pytest.approx(math.atan2(0.36 + turned._pose[1], turned._pose[0]))
-    assert replace(Irb120(), height=0.01).joints(np.zeros(4)) == pytest.approx(
-        Irb120((0.36, 0.0, 0.21, 0.0)).joints(np.zeros(4))
+    assert IRB.placed(height=0.01).joints(np.zeros(4)) == pytest.approx(
+        IRB.placed((0.36, 0.0, 0.21, 0.0)).joints(np.zeros(4))
     )

@@ -18,6 +18,7 @@ BUILT_IN = {
     "dry-run": "flatpush.execution.simulated:dry_run",
     "egm": "flatpush.execution.egm:egm",
     "ur": "flatpush.execution.ur:ur",
+    "franka": "flatpush.execution.franka:franka",
     "mujoco": "flatpush.execution.cell.robot:mujoco",
 }
 

@@ -10,6 +10,7 @@ from ..geometry import wrap_angle
 from ..geometry.pose import Array
 from ..planning.transits import PusherPath
 from ..problem import Plan, Pusher, TransitSegment
+from .arms import ORDINALS
 from .robot import Limits, OutOfLimits
 
 # Limits may be passed by this part: the rounding of differences.
@@ -80,6 +81,15 @@ class Course:
             k = int(np.argmax(values))
             if values[k] > most * (1 + SLACK):
                 self._refuse(k + 1, f"a {name} of {values[k]:.1f} {unit} is above {most:g} {unit}")
+        if limits.arm is not None:
+            joints = np.array([limits.arm.joints(pose) for pose in self.poses])
+            share = np.abs(np.diff(joints, axis=0)) / dt[:, None] / limits.arm.speeds
+            k, joint = (int(n) for n in np.unravel_index(np.argmax(share), share.shape))
+            if share[k, joint] > 1 + SLACK:
+                rate, most = np.degrees(limits.arm.speeds[joint] * np.array([share[k, joint], 1.0]))
+                self._refuse(
+                    k + 1, f"the arm's {ORDINALS[joint]} joint at {rate:.1f} °/s is above {most:.1f} °/s"
+                )
         # From rest to rest; across a sample, over half of the time on each side.
         ends = np.zeros((1, 3))
         change = np.linalg.norm(np.diff(np.concatenate([ends, rates[:, :3], ends]), axis=0), axis=1)

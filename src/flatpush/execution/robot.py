@@ -1,7 +1,6 @@
 """What a robot must offer to push: say where its tool is, take targets for it, and stop."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Protocol, Self
@@ -20,9 +19,21 @@ class OutOfLimits(InputError):
     """A motion that a robot may not make; the message names the segment, the time and the limit."""
 
 
-def reachable(_pose: Array) -> str:
-    """Of a robot whose limits are all numbers: every pose can be reached."""
-    return ""
+class Jointed(Protocol):
+    """What an arm knows of its joints (see `arms.Arm`)."""
+
+    @property
+    def speeds(self) -> Array:
+        """Their greatest speeds, shape (k,) [rad/s]."""
+        ...
+
+    def unreachable(self, pose: Array) -> str:
+        """Why it cannot take a pose (x, y, height, yaw), or ""."""
+        ...
+
+    def joints(self, pose: Array) -> Array:
+        """Joint angles at a pose that it reaches, shape (k,) [rad]."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -37,7 +48,7 @@ class Limits:
         period: of targets [s].
         age: greatest age of the feedback, and greatest delay of a cycle [s].
         deviation: greatest distance between the tool and where it was sent [m].
-        unreachable: why an arm cannot take a pose (x, y, height, yaw), or "".
+        arm: its joints: what they reach, and how fast they are; None: all that the numbers allow.
 
     Raises:
         InputError: for limits that leave nothing.
@@ -51,7 +62,7 @@ class Limits:
     period: float = 0.01
     age: float = 0.1
     deviation: float = 0.01
-    unreachable: Callable[[Array], str] = reachable
+    arm: Jointed | None = None
 
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration", "turn_rate", "period", "age", "deviation"):
@@ -101,7 +112,7 @@ class Limits:
         low, high = self.heights
         if not low - slack <= pose[2] <= high + slack:
             return f"a height of {1000 * pose[2]:.1f} mm is outside of {1000 * low:g} to {1000 * high:g} mm"
-        return self.unreachable(pose)
+        return "" if self.arm is None else self.arm.unreachable(pose)
 
 
 @dataclass(frozen=True, eq=False)

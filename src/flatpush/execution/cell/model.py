@@ -8,7 +8,8 @@ from ...friction.patches import patches
 from ...geometry import Outline
 from ...geometry.pose import Array
 from ...problem import Scene
-from .irb120 import Irb120
+from ..arms import ARMS, Arm
+from .arms import fr3, irb120
 
 # The object is so high, but at most this share of the lift [m]; fingertips are balls at half of that.
 HEIGHT, OF_LIFT = 0.02, 0.6
@@ -49,7 +50,7 @@ def height_of(scene: Scene) -> float:
     return min(HEIGHT, OF_LIFT * scene.pusher.lift)
 
 
-def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Irb120 | None = None) -> str:
+def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Arm | None = None) -> str:
     """The model: joints object-x, -y, -turn, a slide for each foot, and tool-x, -y, -z, -turn, in this order.
 
     The object moves in the plane. Every foot slides up and down on its own and carries exactly its own weight, so
@@ -57,7 +58,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Irb120 | None = N
 
     Args:
         tips: of the fingertips in E, shape (k, 2).
-        arm: holds the tool; its six joints stand in the place of the tool's.
+        arm: holds the tool; its joints stand in the place of the tool's.
     """
     thing, high = scene.object, height_of(scene)
     places, loads, *_ = patches(thing.support.pressure, physics.feet)
@@ -88,7 +89,8 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Irb120 | None = N
 <joint name="tool-y" type="slide" axis="0 1 0"/><joint name="tool-z" type="slide" axis="0 0 1"/>
 <joint name="tool-turn" type="hinge" axis="0 0 1"/>{fingers}</body>"""
     if arm is not None:
-        holder, drives = arm.model(fingers, -high / 2 - FOOT)
+        more, holder, drives = MODELS[arm.name](arm, fingers, -high / 2 - FOOT)
+        assets += more
     cx, cy = thing.cof
     return f"""<mujoco model="flatpush cell">
 <compiler boundmass="1e-9" boundinertia="1e-9"/>
@@ -109,6 +111,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Irb120 | None = N
 </mujoco>"""
 
 
+MODELS = {ARMS["irb120"].name: irb120, ARMS["fr3"].name: fr3}
 _SHY = 'contype="0" conaffinity="0"'  # touches only what a pair names
 
 

@@ -13,9 +13,9 @@ from ...errors import InputError, MissingExtra
 from ...geometry.pose import Array
 from ...problem import Plan
 from ..addresses import Address
+from ..arms import ARMS, Arm
 from ..robot import Limits, RobotFault, State
 from ..simulated import DryRun, Unknown, home_of
-from .irb120 import Irb120
 from .model import DAMPING, FOOT, STEP, STIFFNESS, Physics, cell_xml, height_of
 
 LIMITS = Limits(period=0.004, deviation=0.005)
@@ -24,6 +24,8 @@ OBJECT, TOOL = slice(0, 3), slice(-4, None)
 # The drives are led by this much of the speed, so that their damping does not hold the tool back [s].
 LEAD = DAMPING / STIFFNESS
 PICTURE = (960, 1280)
+# The arms that it has.
+HELD_BY = ("irb120", "fr3")
 
 
 def load() -> ModuleType:
@@ -60,7 +62,7 @@ class CellRobot(DryRun):
         unknown: Unknown | None = None,
         *,
         table: float | None = None,
-        arm: Irb120 | None = None,
+        arm: Arm | None = None,
         home: ArrayLike | None = None,
         limits: Limits = LIMITS,
     ) -> None:
@@ -68,7 +70,7 @@ class CellRobot(DryRun):
         if arm is not None:
             # Heights of E count from the middle of the object, which is above the table.
             arm = replace(arm, height=height_of(scene) / 2 + FOOT)
-            limits = replace(limits, unreachable=arm.unreachable)
+            limits = replace(limits, arm=arm)
         super().__init__(home_of(plan) if home is None else home, limits)
         self._mujoco, self._arm = load(), arm
         if height_of(scene) / 2 + scene.pusher.lift - scene.pusher.tip_radius < height_of(scene):
@@ -150,16 +152,16 @@ class CellRobot(DryRun):
 
 
 def mujoco(address: Address, plan: Plan) -> CellRobot:
-    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`, or `mujoco://irb120`"""
-    if address.host not in ("", "tool", "irb120"):
+    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`, `mujoco://irb120`, `mujoco://fr3`"""
+    if address.host not in ("", "tool", *HELD_BY):
         raise InputError(
             "the physics cell has no such arm",
             value=address.text,
-            hint="There are mujoco://tool and mujoco://irb120.",
+            hint=f"There are mujoco://tool, {', '.join(f'mujoco://{name}' for name in HELD_BY)}.",
         )
     arm = None
-    if address.host == "irb120":
-        arm = Irb120(address.base) if any(address.base) else Irb120()
+    if address.host in HELD_BY:
+        arm = ARMS[address.host].placed(address.base if any(address.base) else None)
     limits, unknown = address.limits(LIMITS), Unknown.of(address)
     (table,) = address.numbers("table", 1, (np.nan,))
     address.check_used()

@@ -1,0 +1,159 @@
+"""A Franka Research 3 over loopback: franky-sim in a process of its own, slower than real time; judged by its clock."""
+
+import itertools
+import math
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.simulated_controller import SimulatedController
+
+import flatpush as fp
+from flatpush.execution import DONE, RobotFault, Target, open_robot, run
+from flatpush.execution.arms import ARMS
+from flatpush.execution.cell.robot import CellRobot
+from flatpush.execution.course import Course
+from flatpush.execution.run import Played, stream
+from flatpush.execution.simulated import home_of
+from flatpush.testing import check_robot
+
+pytest.importorskip("franky")
+pytest.importorskip("franky_sim")
+from flatpush.execution.franka import FrankaRobot
+
+HOME = np.array([-0.05, 0.02, 0.03, 0.5])
+# franky-sim has Franka's hand: 103.4 mm long, turned by 45°.
+ARM = replace(ARMS["fr3"].placed(), tool=0.1034, turn=math.pi / 4)
+SILENCE = 20.0  # on a shared machine: what is asserted is the robot's time
+numbers = itertools.count(1)
+
+
+class Controller(SimulatedController):
+    """Its port is fixed, so each has an address of its own."""
+
+    def __init__(self, home=HOME, joints=None):
+        self.host = f"127.{50 + os.getpid() // 250 % 200}.{1 + os.getpid() % 250}.{next(numbers) % 250}"
+        joints = ARM.joints(home) if joints is None else joints
+        super().__init__("franka_controller.py", "--host", self.host, "--joints", *joints)
+
+
+def robot_at(host, **more):
+    return FrankaRobot(host, **{"silence": SILENCE, "connect": SILENCE} | more)
+
+
+def moved(robot, cycles, told=None):
+    """There and back, for so many cycles of 10 ms."""
+    t = 0.01 * np.arange(cycles - 1.0)
+    shape = 0.5 - 0.5 * np.cos(2 * np.pi * t / t[-1])
+    poses = robot.state().pose + shape[:, None] * np.array([0.01, 0.0, 0.0, 0.1])
+    course = Course(t, poses, np.zeros(len(t), int), ("swing",), (-1,))
+    course.check(robot.limits)
+    return stream(Played(course, robot.limits.period), robot, robot.clock, told=told)
+
+
+@pytest.mark.slow
+def test_the_tool_follows_and_rests_and_its_end_is_noticed():
+    with Controller() as controller, robot_at(controller.host, silence=2.0) as robot:
+        assert np.allclose(robot.state().pose, HOME, atol=2e-5)
+        assert np.allclose(controller.asked()["q"], ARM.joints(HOME), atol=1e-4)
+        ended = moved(robot, 60)
+        assert ended.outcome == DONE
+        poses = np.array([cycle.state.pose for cycle in ended.cycles])
+        assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=2e-4)
+        assert np.ptp(poses[:, 3]) == pytest.approx(0.1, abs=2e-3)
+        assert ended.off < 3e-4
+        rests = robot.state().pose
+        robot.clock.wait(robot.time + 0.1)
+        assert np.allclose(robot.state().pose, rests, atol=5e-5)
+        count = 0
+
+        def told(cycle):
+            nonlocal count
+            count += 1
+            if count == 20:
+                controller.process.send_signal(signal.SIGKILL)
+
+        ended = moved(robot, 60, told)
+        robot.stop()
+    assert "lost" in ended.outcome or "silent" in ended.outcome or "ended the motion" in ended.outcome
+    assert 20 <= len(ended.cycles) <= 31
+
+
+@pytest.mark.slow
+def test_a_velocity_that_is_not_renewed_ends_after_a_tenth_of_a_second():
+    """As where this side hangs: one velocity is sent, and nothing more."""
+    with Controller() as controller, robot_at(controller.host) as robot:
+        start = robot.state()
+        robot.send(Target(robot.time + 0.01, start.pose, np.array([0.05, 0.0, 0.0, 0.0])))
+        begun = robot.time
+        while robot.time < begun + 0.2:
+            robot.receive()
+        after = robot.state()
+        far = after.pose[0] - start.pose[0]
+        assert 0.002 < far < 0.05 * 0.11
+        robot.clock.wait(robot.time + 0.1)
+        assert np.allclose(robot.state().pose, after.pose, atol=2e-5)
+
+
+@pytest.mark.slow
+def test_a_turned_elbow_is_no_start():
+    joints = ARM.joints(HOME)
+    joints[2] = 0.1
+    with Controller(joints=joints) as controller, robot_at(controller.host) as robot:
+        assert "third and fifth joint" in robot.state().fault or "straight down" in robot.state().fault
+
+
+@pytest.mark.slow
+def test_it_conforms():
+    controllers = []
+
+    def make():
+        while controllers:
+            controllers.pop().__exit__()
+        controllers.append(Controller())
+        return robot_at(controllers[-1].host, silence=2.0)
+
+    try:
+        assert len(check_robot(make, kill=lambda robot: controllers[-1].process.kill())) == 10
+    finally:
+        controllers.pop().__exit__()
+
+
+@pytest.mark.slow
+def test_the_same_plan_ends_at_the_same_place_on_all_arms(triangle):
+    """On the network the FR3 has no object: the way that its tool really made pushes the one of the physics cell."""
+    pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
+    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(triangle, (-0.01, -0.03, 0.1), pusher=pusher, pushes=pushes))
+    with Controller(home_of(plan)) as controller, robot_at(controller.host) as robot:
+        ended = run(plan, robot)
+    assert ended.outcome == DONE
+    off = [cycle.off for cycle in ended.cycles if "push" in cycle.leg]
+    assert np.mean(off) < 1e-4
+    assert np.max(off) < 3e-4
+    found = {}
+    with CellRobot(plan) as cell:
+        for cycle in ended.cycles:
+            cell.send(Target(cell.clock.now() + 0.01, cycle.state.pose, cycle.state.twist))
+            cell.clock.wait(cell.clock.now() + 0.01)
+        found["network"] = cell.object
+    for name in ("fr3", "irb120"):
+        with open_robot(f"mujoco://{name}", plan) as cell:
+            run(plan, cell)
+            found[name] = cell.object
+    for one, other in itertools.combinations(found.values(), 2):
+        assert np.hypot(*(one - other)[:2]) < 0.0005
+        assert abs(one[2] - other[2]) < math.radians(0.3)
+
+
+def test_where_nobody_answers_and_its_address(triangle):
+    with pytest.raises(RobotFault, match=r"no Franka robot at 127\.1\.2\.3: port 1337 does not answer"):
+        FrankaRobot("127.1.2.3", connect=0.2).__enter__()
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(triangle, (-0.02, -0.05, 0.2), pusher=pusher, pushes=pushes))
+    assert open_robot("franka://10.0.0.7?speed=50", plan).limits.speed == pytest.approx(0.05)
+    with pytest.raises(fp.InputError, match="has an address"):
+        open_robot("franka", plan)
