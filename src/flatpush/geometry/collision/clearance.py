@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..pose import compose, exp
+from ..pose import Array, compose, exp
 from .body import Body
 from .world import World
 
@@ -40,9 +40,10 @@ def pose_clearance(world: World, body: Body, pose: ArrayLike, reach: float = np.
     """
     from .kernels import pose_gap
 
-    return float(
-        pose_gap(world.arrays, body.arrays, np.array(pose, dtype=float), _finite(world, reach), -np.inf)
-    )
+    if world.empty:
+        return reach
+    X = np.array(pose, dtype=float)
+    return float(pose_gap(world.arrays, body.arrays, X, _finite(world, body, X, reach), -np.inf))
 
 
 def path_clearance(
@@ -66,9 +67,11 @@ def path_clearance(
     """
     from .kernels import pose_gap, twist_gap
 
-    far = _finite(world, reach)
+    if world.empty:
+        return Clearance(reach, 0, 0.0, -2)
     arrays = world.arrays, body.arrays
     X, twists = np.array(start, dtype=float), np.array(steps, dtype=float).reshape(-1, 3)
+    far = _finite(world, body, np.concatenate([X[None], twists]), reach)
     best = float(pose_gap(*arrays, X, far, -np.inf))
     at, from_pose = 0, X
     for i, step in enumerate(twists):
@@ -85,9 +88,11 @@ def path_clearance(
     return Clearance(best, at, fraction, obstacle)
 
 
-def _finite(world: World, reach: float) -> float:
-    """A finite reach: beyond it there is nothing."""
+def _finite(world: World, body: Body, motions: Array, reach: float) -> float:
+    """A finite reach, longer than any distance at a pose (3,), or on the way of a pose and twists (n, 3)."""
     if np.isfinite(reach):
         return reach
     values = [1.0, *np.abs(world.boxes).ravel(), *np.abs(world.bounds[np.isfinite(world.bounds)])]
-    return 1e3 * float(np.max(values))
+    B = body.arrays
+    own = B.reach + float(np.hypot(B.x, B.y))
+    return 3.0 * float(np.max(values) + own + np.sum(np.hypot(motions[..., 0], motions[..., 1])))
