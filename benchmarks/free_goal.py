@@ -2,6 +2,7 @@
 
 A disc of 80 mm, automatic pushes, random starts. Prints the cost of the free goal, the least of the 72, and
 the CPU time of the search for the free goal in that for one fixed angle (a first start compiles and is left out).
+With the word obstacles, between three walls.
 """
 
 import sys
@@ -11,24 +12,34 @@ from dataclasses import replace
 import numpy as np
 
 import flatpush as fp
+from flatpush.errors import InputError
 from flatpush.geometry import Outline
 from flatpush.planning.empty_table import refined_paths
+from flatpush.problem import Planning, Workspace
 
 ANGLES = np.arange(72) * (np.pi / 36)
+WALLS = (
+    [(-0.1, -0.02), (-0.06, -0.02), (-0.06, 0.1), (-0.1, 0.1)],
+    [(0.06, -0.1), (0.1, -0.1), (0.1, 0.03), (0.06, 0.03)],
+    [(-0.06, -0.12), (0.02, -0.12), (0.02, -0.08), (-0.06, -0.08)],
+)
 
 
-def main(n: int = 5, fingers: int = 2, seed: int = 0) -> None:
+def main(n: int = 5, fingers: int = 2, seed: int = 0, walls: bool = False) -> None:
     rng = np.random.default_rng(seed)
     disc = fp.Object(Outline.circle(0.04), friction=0.3)
     pusher = fp.Pusher(fingers=2, spacing=0.018) if fingers == 2 else fp.Pusher()
     worst, ratios = -np.inf, []
+    world = Workspace(obstacles=WALLS) if walls else Workspace()
     for k in range(n + 1):
-        start = (*rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi))
-        planner = fp.Planner(fp.Scene(disc, start, (0, 0, "free"), pusher))
+        planner = _planner(disc, pusher, world, rng)
 
         def searched(goal: object, planner: fp.Planner = planner) -> tuple[float, float]:
-            began = time.process_time()
-            *_, last = refined_paths(replace(planner.scene, goal=goal), planner.fleet)
+            began, asked = time.process_time(), replace(planner.scene, goal=goal)
+            if walls:
+                *_, last = fp.Planner(asked).answers()
+            else:
+                *_, last = refined_paths(asked, planner.fleet)
             return last.cost, time.process_time() - began
 
         free, own = searched((0, 0, "free"))
@@ -46,5 +57,21 @@ def main(n: int = 5, fingers: int = 2, seed: int = 0) -> None:
     )
 
 
+def _planner(disc: fp.Object, pusher: fp.Pusher, world: Workspace, rng: np.random.Generator) -> fp.Planner:
+    """From a random start at which the disc is clear of the walls."""
+    while True:
+        start = (*rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi))
+        planning = Planning(time_limit=60.0)
+        planner = fp.Planner(
+            fp.Scene(disc, start, (0, 0, "free"), pusher, workspace=world, planning=planning)
+        )
+        try:
+            next(planner.answers())
+        except InputError:
+            continue
+        return planner
+
+
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    given = [word for word in sys.argv[1:] if word != "obstacles"]
+    main(*map(int, given), walls="obstacles" in sys.argv[1:])

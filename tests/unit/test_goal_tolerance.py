@@ -92,3 +92,16 @@ def test_a_free_angle_and_a_wide_place_go_together(triangle):
     assert wide.cost < free.cost - 0.002
     assert np.abs(wide.certificate.goal_error[:2]).max() == pytest.approx(0.0035, abs=1e-9)
     assert fp.verify(wide).ok
+
+
+@pytest.mark.slow
+def test_among_obstacles_the_end_moves_within_the_tolerance():
+    """The maze in one round: the wide plan is cheaper, ends in the box, and its clearance holds."""
+    scene = fp.load_scene(EXAMPLES / "maze_first.yaml")
+    scene = replace(scene, planning=replace(scene.planning, iterations=400, time_limit=60.0))
+    exact, wide = fp.plan(scene), fp.plan(_with(scene, (0.01, 0.01, 0.3)))
+    assert np.abs(exact.certificate.goal_error).max() < 1e-9
+    assert wide.cost < exact.cost - 0.003
+    error = np.abs(wide.certificate.goal_error)
+    assert 0.001 < error[:2].max() <= 0.0095 + 1e-9
+    assert fp.verify(wide).ok

@@ -64,7 +64,8 @@ def place_fingers(
         tip = at.point - tip_radius * at.normal
         if outline.nearest(tip).distance < tip_radius - 1e-9 * outline.size:
             raise InputError(
-                "the fingertip does not fit there without overlapping the outline", value=at.point
+                f"the fingertip does not fit at {_told(at.point)} without overlapping the outline",
+                hint="A thinner fingertip or another place would help.",
             )
         pose = np.array([*tip, np.arctan2(at.normal[1], at.normal[0])])
         return Placement(at.point[None], at.normal[None], tip[None], pose)
@@ -91,18 +92,27 @@ def place_fingers(
 
     angle = _balance(imbalance, heading, 1e-12 * outline.size)
     if angle is None:
-        raise InputError("only one of the fingers meets the outline there", value=at.point)
+        raise InputError(
+            f"only one of the fingers, {1000 * spacing:.4g} mm apart, meets the outline at {_told(at.point)}",
+            hint="A smaller spacing would help.",
+        )
     ways, touched = reach(np.array([angle]))
     left, right = float(ways[0, 0]), float(ways[1, 0])
     if not np.isfinite(left + right) or abs(left - right) > 1e-7 * outline.size:
-        raise InputError("the two fingers cannot both touch the outline there", value=at.point)
+        raise InputError(
+            f"two fingers, {1000 * spacing:.4g} mm apart, cannot both touch the outline at {_told(at.point)}",
+            hint="Another place or spacing would help.",
+        )
     x = rotate(angle, [1.0, 0.0])
     y = perpendicular(x)
     middle = at.point - 2 * outline.size * x + 0.5 * (left + right) * x
     tips = np.stack([middle + spacing / 2 * y, middle - spacing / 2 * y])
     points = touched[:, 0]
     if np.max(np.linalg.norm(points - at.point, axis=1)) > 2 * spacing + 2 * tip_radius:
-        raise InputError("another part of the outline is in the fingers' way there", value=at.point)
+        raise InputError(
+            f"another part of the outline is in the fingers' way at {_told(at.point)}",
+            hint="Another place, or thinner or closer fingers, would help.",
+        )
     normals = np.stack([_normal(outline, p, t) for p, t in zip(points, tips, strict=True)])
     return Placement(points, normals, tips, np.array([*middle, wrap_angle(angle)]))
 
@@ -183,7 +193,10 @@ def _normal(outline: Outline, point: Array, tip: Array) -> Array:
     corner = found.edge if found.along < 0.5 else (found.edge + 1) % n
     before, after = outline.edge_normals[corner - 1], outline.edge_normals[corner]
     if np.arccos(np.clip(before @ after, -1.0, 1.0)) > SMOOTH_CORNER:
-        raise InputError("a fingertip would rest on a corner of the outline", value=point)
+        raise InputError(
+            f"a fingertip would rest on a corner of the outline, at {_told(point)}",
+            hint="A place further from the corner would help.",
+        )
     away = point - tip
     return away / np.hypot(*away) if np.hypot(*away) > 0 else (before + after) / np.hypot(*(before + after))
 
@@ -222,3 +235,9 @@ def _finer(imbalance: Callable[[Array], Array], near: float, far: float) -> floa
         if abs(far - near) <= 4e-16 * max(1.0, abs(near)):
             break
     return 0.5 * (near + far)
+
+
+def _told(point: Array) -> str:
+    """A point of the drawing, for messages."""
+    x, y = 1000 * point + 0.0
+    return f"({x:.2f}, {y:.2f}) mm"

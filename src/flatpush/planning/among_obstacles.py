@@ -1,6 +1,7 @@
 """The search among obstacles for a scene: each path is made a plan, checked as a whole, and only then given."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Segments, assemble
 from .empty_table import Found, refined_paths
-from .obstacles import Search, careful, obstructions, pruned, query_of
+from .obstacles import Portfolio, careful, obstructions, pruned, query_of, widest_way
 from .options import PushOption
 from .path import Path
 from .segments import SAG
@@ -24,12 +25,16 @@ from .transits import Transits
 WORK, PATIENCE = 30, 4
 BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
 LARGEST_GAP = 1.0  # clearances beyond it are not told apart [m]
+MOST = 4  # angles at the goal that are searched for where any will do
 SAMPLES = 7  # points of an edge that is drawn
 Progress = Callable[[float, float, int], object]
 
 
 class AmongObstacles:
-    """One query among obstacles.
+    """One scene among obstacles.
+
+    Args:
+        endpoints: where the object may end, shape (e, 3), the most promising first: the goal, or several angles there.
 
     Attributes:
         search: the search, for what it has seen.
@@ -44,17 +49,20 @@ class AmongObstacles:
         fleet: Fleet,
         transits: Transits,
         progress: Progress | None,
+        endpoints: Array,
     ) -> None:
         self.scene, self.options, self.transits, self.progress = scene, options, transits, progress
-        self.query = query_of(scene, options, fleet)
-        self.search = Search(self.query, scene.planning.seed)
+        first = query_of(scene, options, fleet, endpoints[0])
+        queries = [first, *(replace(first, goal=goal) for goal in endpoints[1:])]
+        self.queries = [query for query in queries if query.last][:MOST] or [first]
+        self.search = Portfolio(self.queries, scene.planning.seed)
         self.best, self.refused = np.inf, 0
         self.complaint = self.stopped_by = ""
         self._first: float | None = None
 
     def plans(self) -> Iterator[tuple[Found, Segments]]:
         """Better and better paths that are plans as a whole; ends with the limits of the scene."""
-        self.complaint = obstructions(self.scene, self.query, self.options)
+        self.complaint = obstructions(self.scene, self.queries[0], self.options)
         if self.complaint:
             return
         began = clock()
@@ -62,9 +70,10 @@ class AmongObstacles:
             plan = self._checked(path, began)
             if plan is not None:
                 yield plan
-            elif self.search.query is self.query:
+            else:
                 # The hand did not find its way at a change of push: from now on changes have room to spare.
-                self.search = Search(careful(self.scene, self.query), self.scene.planning.seed)
+                queries = [careful(self.scene, query) for query in self.queries]
+                self.search = Portfolio(queries, self.scene.planning.seed)
                 break
         else:
             return
@@ -73,7 +82,7 @@ class AmongObstacles:
             if plan is not None:
                 yield plan
 
-    def _rounds(self, began: float, search: Search) -> Iterator[Path]:
+    def _rounds(self, began: float, search: Portfolio) -> Iterator[Path]:
         """Paths that are worth checking."""
         planning = self.scene.planning
         given, fresh = np.inf, True
@@ -101,10 +110,10 @@ class AmongObstacles:
                         yield search.best
                     return
 
-    def _free(self, search: Search) -> bool:
+    def _free(self, search: Portfolio) -> bool:
         """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
         clear = False
-        for done, found in enumerate(refined_paths(self.scene, self.query.fleet)):
+        for done, found in enumerate(refined_paths(self.scene, self.queries[0].fleet)):
             clear = search.offer(found.path)
             if done > 0 and not clear:
                 return False
@@ -113,20 +122,20 @@ class AmongObstacles:
     def _checked(self, path: Path, began: float) -> tuple[Found, Segments] | None:
         """The plan of a path, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.planning.clearance
-        shorter = pruned(self.query, path)
+        shorter = pruned(self.queries[0], path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if self.search.value(shorter) < self.best else path
         try:
             segments = assemble(scene, self.transits, self.options, path)
         except FlatpushError as error:
             self.refused += 1
-            self.complaint = f"{error}. "
+            self.complaint = f"{error}."
             return None
-        room = hand_clearance(scene, self.query.world, segments)
+        room = hand_clearance(scene, self.queries[0].world, segments)
         if room < need:
             self.refused += 1
             self.complaint = (
-                f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm). "
+                f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm)."
             )
             return None
         self.best = self.search.value(path)
@@ -140,20 +149,29 @@ class AmongObstacles:
     @property
     def tried(self) -> str:
         """What was tried, for a scene without a plan."""
-        search = self.search
+        search, need = self.search, 1000 * self.scene.planning.clearance
+        keeping = f" with {need:.2f} mm of clearance" if need > 0 else ""
         if self.complaint and not search.nodes:
             return self.complaint
         if search.closed:
+            way = 2000 * widest_way(self.queries[0])
+            room = f"no way is wider than about {way:.1f} mm" if way > 0 else "nothing gets through at all"
             return (
-                f"even a disc of {1000 * search.disc:.1f} mm radius, the largest inside the object, has no way from"
-                " the start to the goal that keeps the clearance. "
+                f"the object does not fit through from the start to the goal{keeping}.\n"
+                f"{room}, and the object is {2000 * search.disc:.1f} mm wide (the largest disc inside it).\n"
+                "A wider gap, less clearance (planning.margin.clearance) or another start or goal would help."
             )
-        refused = f"{self.refused} ways were refused: {self.complaint}" if self.refused else ""
+        head = f"no way{keeping} was found"
+        if self.stopped_by == "time_limit":
+            head = f"stopped by time_limit after {self.scene.planning.time_limit:g} s"
+        finest = f" in cells down to {1000 * search.finest:.1f} mm" if np.isfinite(search.finest) else ""
+        refused = (
+            f"\n{self.refused} ways were refused, the last because {self.complaint}" if self.refused else ""
+        )
         return (
-            f"{search.nodes} poses were searched from the start and from the goal with"
-            f" {self.query.fleet.size} pushes, in cells down to {1000 * search.finest:.1f} mm, and none of the ways"
-            f" reached the other end with {1000 * self.scene.planning.clearance:.2f} mm of clearance. {refused}"
-            "More time (time_limit, iterations), less clearance or other pushes may help. "
+            f"{head}: {search.nodes} poses were searched from the start and from the goal with"
+            f" {self.queries[0].fleet.size} pushes{finest}.{refused}\n"
+            "More time (time_limit, iterations), less clearance or other pushes may help."
         )
 
     @property

@@ -109,7 +109,6 @@ def _check_landing(scene: Scene, placement: Placement) -> None:
     back = compose(placement.pose, [-scene.pusher.approach, 0.0, 0.0])
     if not backs_off(scene.object.outline, placement, back, scene.pusher.tip_radius):
         raise InputError(
-            "a finger would land on the object",
-            value=scene.pusher.approach,
-            hint="Use another approach distance.",
+            f"a finger would land on the object, {1000 * scene.pusher.approach:.4g} mm back from where it pushes",
+            hint="Another approach distance would help.",
         )

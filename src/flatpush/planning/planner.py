@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from ..compiling import clock
 from ..errors import FlatpushError, InputError
-from ..geometry.pose import Array
+from ..geometry.pose import Array, wrap_angle
 from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
 from ..simulation import certify
 from ..steering.fleet import Fleet
 from ..steering.free_heading import HEADINGS, cheapest_headings
+from ..steering.lengths import fleet_lengths
 from .among_obstacles import AmongObstacles, Progress
 from .answer import Answer
 from .assembly import Segments, assemble, car_of
@@ -28,6 +29,7 @@ from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
 
+APART = np.deg2rad(40)  # between two angles at a free goal that are searched for among obstacles
 # Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
 ROUNDS_OF_MANY = 1
 
@@ -123,8 +125,10 @@ class Planner:
         best, stopped_by, details = np.inf, "", dict[str, Any]()
         reasons, blocked = self.reasons, ""
         if _crowded(scene):
-            aimed = self._fitting(scene) if scene.free_angle else scene
-            self._among = AmongObstacles(aimed, self.usable, self.fleet, self.transits, self._progress)
+            endpoints = self._fitting(scene) if scene.free_angle else scene.goal_pose[None]
+            self._among = AmongObstacles(
+                scene, self.usable, self.fleet, self.transits, self._progress, endpoints
+            )
             for found, segments in self._among.plans():
                 best, details = found.cost, found.details
                 yield Answer(best, partial(_solved, scene, segments, began, details), details)
@@ -145,11 +149,6 @@ class Planner:
         if stopped_by == "time_limit":
             details["stopped_by"] = stopped_by  # of the last answer, whose plan is yet to be made
         if np.isinf(best):
-            if stopped_by == "time_limit":
-                limit = (
-                    f"stopped by time_limit after {scene.planning.time_limit:g} s; more time may find a plan."
-                )
-                blocked = f"{limit}\n{blocked}"
             lines = (blocked.strip(), _listed(reasons))
             yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
 
@@ -179,25 +178,34 @@ class Planner:
         _, headings = cheapest_headings(self.fleet, scene.start_pose, place)
         return np.column_stack([np.tile(place, (self.fleet.size, 1)), headings])
 
-    def _fitting(self, scene: Scene) -> Scene:
-        """The scene with an angle at the goal at which the object fits there: the cheapest of an empty table that does.
+    def _fitting(self, scene: Scene) -> Array:
+        """Poses at the goal where the object fits, turned by at least APART, shape (e, 3): the cheapest of an empty
+        table first.
 
         Raises:
             InputError: if it fits with none, what is in the way with the cheapest.
         """
-        costs, headings = cheapest_headings(self.fleet, scene.start_pose, scene.goal_pose[:2])
+        place = scene.goal_pose[:2]
+        costs, headings = cheapest_headings(self.fleet, scene.start_pose, place)
         turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
+        all_around = fleet_lengths(self.fleet, scene.start_pose, [(*place, turn) for turn in turns]).min(
+            axis=0
+        )
+        angles = np.concatenate([headings[:, 0], turns])
+        fits: list[tuple[float, ...]] = []
         complaint: InputError | None = None
-        for angle in np.concatenate([headings[np.argsort(costs[:, 0]), 0], turns]):
-            aimed = replace(scene, goal=(*scene.goal_pose[:2], angle))
+        for angle in angles[np.argsort(np.concatenate([costs[:, 0], all_around]), kind="stable")]:
+            if any(abs(wrap_angle(angle - other)) < APART for *_, other in fits):
+                continue
             try:
-                check_endpoints(aimed)
+                check_endpoints(replace(scene, goal=(*place, angle)))
             except InputError as error:
                 complaint = complaint or error
             else:
-                return aimed
-        assert complaint is not None
-        raise complaint
+                fits.append((*place, angle))
+        if not fits and complaint is not None:
+            raise complaint
+        return np.array(fits)
 
     @cached_property
     def transits(self) -> Transits:

@@ -88,8 +88,8 @@ class Query:
         arrays = QueryArrays(
             self.world.arrays, points, hulls, tips, hands, np.array(self.backs, dtype=float, order="C"),
             self.fleet.cars, np.array(self.fleet.switching, dtype=float, order="C"),
-            np.zeros(self.fleet.size, np.bool_), offsets() if self.robust else np.zeros((0, 3)), self.clearance,
-            self.room, self.inside,
+            np.zeros(self.fleet.size, np.bool_), offsets() if self.robust else np.zeros((0, 3)), self.goal.copy(),
+            np.array([*self.slack[:2], np.pi if self.free else self.slack[2]]), self.clearance, self.room, self.inside,
         )  # fmt: skip
         arrays.last[:] = [stands(arrays, a, self.goal) for a in range(self.fleet.size)]
         return arrays

@@ -23,6 +23,7 @@ class QueryArrays(NamedTuple):
         last: whether a push may end at the goal, shape (k,).
         offsets: displacements of switch poses for the cost of replanning, shape (16, 3) [m, m, rad]; none where a path
             is judged by its own cost.
+        goal, slack: where a path ends, and how far from that it may, half a turn for any angle; both (3,) [m, rad].
         need, room, inside: Query.clearance, Query.room, Query.inside.
     """
 
@@ -36,6 +37,8 @@ class QueryArrays(NamedTuple):
     switching: Array
     last: np.ndarray
     offsets: Array
+    goal: Array
+    slack: Array
     need: float
     room: float
     inside: bool

@@ -6,15 +6,19 @@ Whether a motion keeps the clearance is decided exactly, between its ends includ
 """
 
 from .endpoints import check_endpoints
+from .portfolio import Portfolio
 from .prune import pruned
 from .scene_query import careful, obstructions, query_of
 from .search import Search
+from .widest_way import widest_way
 
 __all__ = [
+    "Portfolio",
     "Search",
     "careful",
     "check_endpoints",
     "obstructions",
     "pruned",
     "query_of",
+    "widest_way",
 ]

@@ -16,7 +16,7 @@ from ..query_arrays import HULL, QueryArrays
 _POINTS, _HULLS, _NO_OFFSETS = BODY.points[None].copy(), np.zeros(1, HULL), np.zeros((0, 3))
 QUERY = QueryArrays(
     WORLD, _POINTS, _HULLS, _POINTS, _HULLS, np.zeros((1, 2)), np.zeros(1, CAR), np.zeros((1, 1)),
-    np.zeros(1, np.bool_), _NO_OFFSETS, 0.0, 0.0, False,
+    np.zeros(1, np.bool_), _NO_OFFSETS, np.zeros(3), np.zeros(3), 0.0, 0.0, False,
 )  # fmt: skip
 _POSE, _WORDS = np.zeros(3), np.zeros(1, WORD)
 

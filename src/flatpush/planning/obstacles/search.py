@@ -30,6 +30,7 @@ class Search:
 
     Attributes:
         best: the cheapest path so far, or None; cost: what it is judged by, infinite without one.
+        known: a cost that is known from elsewhere; dearer paths are of no interest.
         work: poses expanded and moves tried so far.
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
@@ -40,7 +41,7 @@ class Search:
     def __init__(self, query: Query, seed: int) -> None:
         self.query = query
         self.best: Path | None = None
-        self.cost = np.inf
+        self.cost = self.known = np.inf
         self.work = 0
         self.nodes = 0
         self.finest = np.inf
@@ -140,7 +141,7 @@ class Search:
                         query = self.query.reversed if back else self.query
                         if len(reaches) == back:
                             reaches.append(Reach(query))
-                        pair.append(Lattice(query, reaches[back], level, self.cost * SLACK, self._rng))
+                        pair.append(Lattice(query, reaches[back], level, self._limit, self._rng))
                     lattice = pair[back]
                     found = self._advance(lattice)
                     yield found.backwards(self.query.fleet, self.query.start) if found and back else found
@@ -148,9 +149,13 @@ class Search:
                         break
             k += 1
 
+    @property
+    def _limit(self) -> float:
+        return min(self.cost, self.known) * SLACK
+
     def _advance(self, lattice: Lattice) -> Path | None:
         seen, expanded = lattice.size, lattice.expanded
-        better = lattice.advance(1 + EXPANSIONS // self.query.fleet.size, self.cost * SLACK)
+        better = lattice.advance(1 + EXPANSIONS // self.query.fleet.size, self._limit)
         self.work += lattice.expanded - expanded
         self.nodes += lattice.size - seen
         if self._drawn is None or self._drawn.size < lattice.size <= DRAWN:

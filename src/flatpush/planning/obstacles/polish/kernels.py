@@ -7,9 +7,9 @@ import numpy as np
 
 from ....compiled import inner, kernel
 from ....geometry.pose import Array
-from ....steering.six_words import MOST_WORDS, STRAIGHT, WORD, Records, drive, price
+from ....steering.six_words import MOST_WORDS, STRAIGHT, TURN, WORD, Records, drive, price
 from ...query_arrays import QueryArrays
-from ..kernels import changes, connect, put, random, replanned
+from ..kernels import changes, connect, free, lands, put, random, replanned
 
 MOST = 256
 LONGEST_SHORTCUT = 48  # legs of a path that one word may replace at first
@@ -157,12 +157,15 @@ def _replace(
 
 @inner
 def _shift(
-    T: QueryArrays, legs: Legs, low: int, high: int, state: np.ndarray, spread: float, limit: float, buffer: Records,
-    here: Array,
+    T: QueryArrays, legs: Legs, n: int, low: int, high: int, state: np.ndarray, spread: float, limit: float,
+    buffer: Records, here: Array,
 ) -> bool:  # fmt: skip
-    """Shifts the knots low … high alike and steers the legs about them again; whether they cost less than the limit."""
+    """Shifts the knots low … high alike and steers the legs about them again; whether they cost less than the limit.
+
+    The last knot stays within the slack of the goal.
+    """
     poses, pushes, words = legs.poses, legs.pushes, legs.words
-    radius = T.cars[pushes[low]].radius
+    radius = T.cars[pushes[min(low, n - 1)]].radius
     dx, dy, turn = radius * spread * _normal(state), radius * spread * _normal(state), spread * _normal(state)
     mx, my = poses[low, 0], poses[low, 1]
     c, s = math.cos(turn), math.sin(turn)
@@ -170,8 +173,17 @@ def _shift(
         x, y = poses[i, 0] - mx, poses[i, 1] - my
         poses[i, 0], poses[i, 1] = mx + dx + c * x - s * y, my + dy + s * x + c * y
         poses[i, 2] += turn
+    if high == n:
+        end = poses[n]
+        for j in range(3):
+            off = end[j] - T.goal[j]
+            if j == 2:
+                off -= TURN * math.floor(off / TURN + 0.5)
+            end[j] = T.goal[j] + min(max(off, -T.slack[j]), T.slack[j])
+        if not (free(T, pushes[n - 1], end) and lands(T, pushes[n - 1], end)):
+            return False
     cost = 0.0
-    for i in range(low - 1, high + 1):
+    for i in range(low - 1, min(high + 1, n)):
         if i >= low and pushes[i] != pushes[i - 1] and not changes(T, pushes[i - 1], pushes[i], poses[i]):
             return False
         k = connect(T, pushes[i], poses[i], poses[i + 1], limit - cost, TRIES, buffer, here)
@@ -184,10 +196,16 @@ def _shift(
 
 @kernel()
 def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> int:
-    """Tries a number of moves; returns the number of legs that the chain then has."""
+    """Tries a number of moves; returns the number of legs that the chain then has.
+
+    T.last is for where the chain ends; where that moves, it is renewed.
+    """
     new = Legs(np.empty((MOST + 1, 3)), np.empty(MOST, np.int64), np.empty(MOST, WORD))
     buffer, off, here = np.empty(MOST_WORDS, WORD), np.empty(3), np.empty(3)
     k, cost = len(T.cars), total(T, legs, n)
+    loose = (
+        1 if T.slack[0] > 0.0 or T.slack[1] > 0.0 or T.slack[2] > 0.0 else 0
+    )  # whether the last knot moves, too
     knot = KNOT * cost
     # What replanning costs more, or 0: a better chain may itself cost so much more, if replanning it costs less.
     spare = max(0.0, _worth(T, legs, n, buffer, off, here) - cost)
@@ -196,24 +214,24 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
         kind = random(state)
         m = n
         _copy(legs, n, new)
-        if kind < 0.55 and (n > 1 or kind > 0.5):
-            if (kind > 0.45 or n == 1) and n + 1 < MOST:  # with a new knot
+        if kind < 0.55 and (n + loose > 1 or kind > 0.5):
+            if (kind > 0.45 or n + loose == 1) and n + 1 < MOST:  # with a new knot
                 leg = int(random(state) * n)
                 m = _split(T, new, n, leg, random(state))
                 low = high = leg + 1
             else:
-                low = 1 + int(random(state) * (n - 1))
+                low = 1 + int(random(state) * (n - 1 + loose))
                 high = low
                 if kind < 0.15:
-                    high = min(n - 1, low + int(random(state) * 4))
+                    high = min(n - 1 + loose, low + int(random(state) * 4))
             spread = math.exp(math.log(SMALL) + random(state) * (math.log(LARGE) - math.log(SMALL)))
             limit = 0.0
-            for i in range(low - 1, high + 1):
+            for i in range(low - 1, min(high + 1, m)):
                 limit += new.words[i].cost
             limit += spare - GAIN * cost
             if m > n:
                 limit -= total(T, new, m) + knot * m + spare - cost
-            if not _shift(T, new, low, high, state, spread, limit, buffer, here):
+            if not _shift(T, new, m, low, high, state, spread, limit, buffer, here):
                 continue
         elif kind < 0.6:
             if n == 1:
@@ -252,6 +270,8 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
         if value + more < cost * (1.0 - GAIN):
             cost, spare, n = value + more, more, m
             _copy(new, n, legs)
+            for a in range(k if loose else 0):
+                T.last[a] = free(T, a, legs.poses[n]) and lands(T, a, legs.poses[n])
     return n
 
 

@@ -17,9 +17,12 @@ class Chain:
 
     def __init__(self, query: Query, path: Path, seed: int) -> None:
         from ....steering.six_words import WORD
+        from ..kernels import stands
         from .kernels import MOST, Legs, thread, worth
 
         self.query = query
+        able = [stands(query.arrays, a, path.poses[-1]) for a in range(query.fleet.size)]
+        self._query_arrays = query.arrays._replace(last=np.array(able))
         self.state = np.array([seed], dtype=np.uint64)
         self._arrays = Legs(np.zeros((MOST + 1, 3)), np.zeros(MOST, np.int64), np.zeros(MOST, WORD))
         legs = _legs(path)
@@ -30,16 +33,16 @@ class Chain:
             word["cost"] = Path.of(path.fleet, path.start, leg).cost
             for i, (_, letter, amount) in enumerate(leg):
                 word["letter"][i], word["amount"][i] = letter, amount
-        self.legs = int(thread(query.arrays, knots, arrived, given, len(legs), self._arrays))
-        self.cost = float(worth(query.arrays, self._arrays, self.legs)) if self.legs else np.inf
+        self.legs = int(thread(self._query_arrays, knots, arrived, given, len(legs), self._arrays))
+        self.cost = float(worth(self._query_arrays, self._arrays, self.legs)) if self.legs else np.inf
 
     def improve(self, moves: int) -> bool:
         """Tries a number of moves; True if the path got cheaper."""
         from .kernels import polish, worth
 
         before = self.cost
-        self.legs = int(polish(self.query.arrays, self._arrays, self.legs, self.state, moves))
-        self.cost = float(worth(self.query.arrays, self._arrays, self.legs))
+        self.legs = int(polish(self._query_arrays, self._arrays, self.legs, self.state, moves))
+        self.cost = float(worth(self._query_arrays, self._arrays, self.legs))
         return self.cost < before * (1 - 1e-12)
 
     @property
