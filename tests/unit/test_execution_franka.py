@@ -126,8 +126,11 @@ def test_the_same_plan_ends_at_the_same_place_on_all_arms(triangle):
     """On the network the FR3 has no object: the way that its tool really made pushes the one of the physics cell."""
     pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
     pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
-    plan = fp.plan(fp.Scene(triangle, (-0.01, -0.03, 0.1), pusher=pusher, pushes=pushes))
-    with Controller(home_of(plan)) as controller, robot_at(controller.host) as robot:
+    plan = fp.plan(fp.Scene(triangle, (-0.01, -0.06, 0.1), pusher=pusher, pushes=pushes))
+    # The push goes along the table's y, away from the arm.
+    base = (0.4, 0.0, 0.2, -math.pi / 2)
+    joints = replace(ARM, base=base).joints(home_of(plan))
+    with Controller(joints=joints) as controller, robot_at(controller.host, base=base) as robot:
         ended = run(plan, robot)
     assert ended.outcome == DONE
     off = [cycle.off for cycle in ended.cycles if "push" in cycle.leg]
@@ -140,7 +143,7 @@ def test_the_same_plan_ends_at_the_same_place_on_all_arms(triangle):
             cell.clock.wait(cell.clock.now() + 0.01)
         found["network"] = cell.object
     for name in ("fr3", "irb120"):
-        with open_robot(f"mujoco://{name}", plan) as cell:
+        with open_robot(f"mujoco://{name}", plan, base) as cell:
             run(plan, cell)
             found[name] = cell.object
     for one, other in itertools.combinations(found.values(), 2):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
@@ -47,7 +50,7 @@ def command(
     figure: Annotated[Path | None, typer.Option(help="Planned against executed: .svg or .png.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
-    """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C stops the robot."""
+    """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C and SIGTERM stop the robot."""
     from ..control import ARRIVED
     from ..control.tracking.plan_controller import goal_error
     from ..documents import check_outputs, load_plan, load_scene, plan_files, scene_files
@@ -79,7 +82,7 @@ def command(
         tell_failed(failed)
         typer.echo("the plan fails verification; nothing was moved", err=True)
         return 4
-    with open_robot(robot, loaded, frame) as arm:
+    with _terminated(), open_robot(robot, loaded, frame) as arm:
         course = (way if controller is None else to_controller)(loaded, arm, speed)
         _show(arm.limits, course, loaded, speed)
         if getattr(arm, "real", True):
@@ -105,6 +108,20 @@ def command(
     else:
         _tell(result, log)
     return 0 if good else 3
+
+
+@contextmanager
+def _terminated() -> Iterator[None]:
+    """SIGTERM ends a run as Ctrl-C does: the robot is stopped."""
+
+    def interrupted(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupted)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _closed(

@@ -61,7 +61,7 @@ class Arm:
 
     def unreachable(self, pose: Array) -> str:
         """Why it cannot take a pose (x, y, height, yaw) of E in W, or ""."""
-        x, y, across, up, _ = self._wrist(pose)
+        x, y, across, up, yaw = self._wrist(pose)
         if math.hypot(x, y) < abs(self.aside) + OVERHEAD or across < OVERHEAD:
             return "it is too near to the axis of the arm's first joint"
         bend = self._bend(across, up)
@@ -70,20 +70,21 @@ class Arm:
             return f"it is {where} the arm: {1000 * math.hypot(across, up):.0f} mm from its shoulder"
         if math.acos(bend) < STRAIGHT:
             return "the arm's elbow is straight there"
-        q = self.joints(pose)
-        for name, angle, (low, high) in zip(ORDINALS, q, self.limits, strict=False):
-            if not low <= angle <= high:
-                return (
-                    f"the arm's {name} joint would be at {math.degrees(angle):.0f}°, outside of"
-                    f" {math.degrees(low):.0f}° to {math.degrees(high):.0f}°"
-                )
+        q = self._angles(x, y, across, up, yaw)
+        outside = (q < self.limits[:, 0]) | (q > self.limits[:, 1])
+        if outside.any():
+            k = int(np.argmax(outside))
+            angle, low, high = np.degrees([q[k], *self.limits[k]])
+            return f"the arm's {ORDINALS[k]} joint would be at {angle:.0f}°, outside of {low:.0f}° to {high:.0f}°"
         if self.wrist is not None and abs(q[self.wrist]) < WRIST:
             return "the arm's wrist is straight there"
         return ""
 
     def joints(self, pose: Array) -> Array:
         """Joint angles for a pose of E in W that it reaches, elbow up, shape (k,) [rad]."""
-        x, y, across, up, yaw = self._wrist(pose)
+        return self._angles(*self._wrist(pose))
+
+    def _angles(self, x: float, y: float, across: float, up: float, yaw: float) -> Array:
         first = math.atan2(y, x) + math.asin(self.aside / math.hypot(x, y))
         bend = math.acos(self._bend(across, up))
         upper = math.atan2(up, across) + math.atan2(

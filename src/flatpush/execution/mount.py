@@ -16,8 +16,10 @@ TILT = 0.01
 
 def in_base(base: Base, pose: Array) -> tuple[float, float, float, float]:
     """A pose of E in W (x, y, height, yaw), in the base frame."""
-    x, y, yaw = compose([base[0], base[1], base[3]], pose[[0, 1, 3]])
-    return float(x), float(y), float(pose[2]) + base[2], float(yaw)
+    # Scalars, because arms ask several times in every cycle.
+    x, y, z, yaw = pose.tolist()
+    c, s = math.cos(base[3]), math.sin(base[3])
+    return base[0] + c * x - s * y, base[1] + s * x + c * y, z + base[2], yaw + base[3]
 
 
 def on_table(base: Base, place: Sequence[float], yaw: float, near: float) -> Array:

@@ -94,7 +94,8 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Arm | None = None
     cx, cy = thing.cof
     return f"""<mujoco model="flatpush cell">
 <compiler boundmass="1e-9" boundinertia="1e-9"/>
-<option timestep="{STEP}" cone="elliptic" solver="Newton" impratio="20" integrator="implicitfast" tolerance="1e-10"/>
+<option timestep="{STEP}" cone="elliptic" solver="Newton" jacobian="sparse" impratio="20"
+ integrator="implicitfast" tolerance="1e-10"/>
 <visual><global offwidth="1280" offheight="960"/><headlight ambient="0.35 0.35 0.35" diffuse="0.25 0.25 0.25"/>
 <map znear="0.01"/></visual>
 <statistic extent="0.4" center="0 0 0"/>

@@ -92,7 +92,8 @@ class CellRobot(DryRun):
         self._data.qpos[OBJECT] = scene.start_pose + start
         self._data.ctrl[:] = self._drives(self._pose)
         self._data.qpos[-len(self._data.ctrl) :] = self._data.ctrl
-        self._held = self._pose
+        # Where the tool was sent last, and its drives there.
+        self._held, self._drawn = self._pose, np.array(self._data.ctrl)
         self._mujoco.mj_forward(self._model, self._data)
         self._body, self._site = self._data.body("tool"), np.zeros(6)
 
@@ -138,14 +139,14 @@ class CellRobot(DryRun):
             moving = min(steps, round((target.time - begin) / STEP))
             share = min(1.0, (until - begin) / (target.time - begin))
             end = target.pose if share == 1 else before + share * (target.pose - before)
-            here, there = self._drives(before), self._drives(end)
+            here, there = self._drawn, self._drives(end)
             rate = (there - here) / max(moving, 1)
             for k in range(1, moving + 1):
                 self._data.ctrl[:] = here + (k + LEAD / STEP) * rate
                 self._mujoco.mj_step(self._model, self._data)
-            self._held = end
+            self._held, self._drawn = end, there
         if moving < steps:
-            self._data.ctrl[:] = self._drives(self._held)
+            self._data.ctrl[:] = self._drawn
             self._mujoco.mj_step(self._model, self._data, steps - moving)
         if self._data.warning.number.any():
             raise RobotFault("the physics of the cell is unstable")
