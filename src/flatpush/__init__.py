@@ -33,7 +33,6 @@ _NAMES = {
     "Noise": "simulation",
     "Object": "problem",
     "Outline": "geometry",
-    "Perturbation": "simulation",
     "Plan": "problem",
     "Planner": "planning",
     "Planning": "problem",
@@ -80,7 +79,6 @@ __all__ = [
     "Noise",
     "Object",
     "Outline",
-    "Perturbation",
     "Plan",
     "Planner",
     "Planning",
@@ -141,7 +139,7 @@ if TYPE_CHECKING:
         Uncertainty,
         Workspace,
     )
-    from .simulation import Claim, Noise, Perturbation, Proof, Report, Runs, prove, simulate
+    from .simulation import Claim, Noise, Proof, Report, Runs, prove, simulate
     from .simulation.study import study
     from .simulation.verify import verify
     from .steering import dubins, flat_output

@@ -9,7 +9,6 @@ from tests.strategies import directions, reals, vectors
 from flatpush import InputError
 from flatpush.control.learning.belief import SteeringBelief, SteeringEstimate, sticking_displacement
 from flatpush.control.learning.friction_bounds import FrictionBounds
-from flatpush.control.learning.probing import probing_velocity
 
 COF, RHO = np.array([0.0012, -0.0007]), 3.1e-4
 CONTACTS = np.array([[-0.025, 0.002], [0.003, -0.0175], [0.025, -0.004]])
@@ -173,28 +172,6 @@ def test_bounds_of_friction_only_tighten_and_never_cross():
     assert (bounds.clip(0.1), bounds.clip(0.25), bounds.clip(0.4)) == (0.2, 0.25, 0.28)
     assert bounds.slipped(0.15).high == 0.2
     assert bounds.stuck(0.5).low == 0.28
-
-
-def test_a_probe_weaves_about_the_normal_and_finds_the_axle():
-    """From knowing nothing, four stretches of 1 cm with 0.3° of noise find the heading within a few degrees."""
-    rng = np.random.default_rng(6)
-    point, normal = np.array([-0.025, 0.002]), np.array([1.0, 0.0])
-    belief = SteeringBelief.prior([0, 0], 4e-4, sd_cof=0.02, sd_rho=1e-3)
-    truth = SteeringEstimate(COF, RHO, np.zeros((3, 3)))
-    start = belief.estimate().axle(point).heading_sd
-    sides = set()
-    for k in range(16):
-        u = probing_velocity(normal, 0.0025 * k, 0.01, 0.01, 0.25)
-        sides.add(np.sign(u[1]))
-        way = u  # one second
-        turn = truth.turn(point, u) + np.deg2rad(0.3) * np.sqrt(2) * rng.standard_normal()
-        belief = belief.observed(
-            point, *sticking_displacement(point, way, turn, np.deg2rad(0.3) * np.sqrt(2))
-        )
-    axle = belief.estimate().axle(point)
-    assert sides == {-1.0, 1.0}
-    assert axle.heading_sd < 0.1 * start
-    assert np.arccos(axle.heading @ truth.axle(point).heading) < 3.5 * axle.heading_sd
 
 
 def test_what_is_refused():

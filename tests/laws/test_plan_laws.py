@@ -10,7 +10,7 @@ from tests.conftest import final_error
 
 import flatpush as fp
 from flatpush.errors import InputError
-from flatpush.geometry import pose_error, transform
+from flatpush.geometry import compose, exp, pose_error, transform
 from flatpush.planning import Planner
 from flatpush.simulation.pieces import pieces
 from flatpush.steering import words
@@ -135,7 +135,6 @@ def test_two_runs_agree_but_for_the_run_entry(triangle):
 
 def test_moving_the_scene_moves_the_plan(triangle):
     """Start and goal turned and shifted together: the same push."""
-    from flatpush.geometry import compose
 
     scene = fp.Scene(triangle, (0.03, 0.05, 0.7))
     X = np.array([0.2, -0.1, 2.0])
@@ -203,7 +202,9 @@ def test_clearance_sees_a_needle_between_samples(triangle):
         assert plan.status == "solved", plan.reason
         for piece in pieces(plan.segments, scene.start_pose):
             for f in np.linspace(0, 1, 10):
-                shape = Polygon(transform(piece.object_at(f), triangle.outline.vertices))
+                shape = Polygon(
+                    transform(compose(piece.object, exp(f * piece.object_step)), triangle.outline.vertices)
+                )
                 assert shape.distance(Polygon(needle)) >= plan.certificate.clearance
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from flatpush.errors import InputError
 from flatpush.friction import Ellipsoid, Exact, Quartic, Support, fit_quartic, fit_surface
-from flatpush.friction.draws import SurfaceDraws, draw_loads, draw_surface, wishart
+from flatpush.friction.draws import SurfaceDraws, draw_loads, wishart
 from flatpush.friction.sos import gram_defect, tensor
 
 FEET = [(-0.02, -0.01), (0.02, -0.01), (0.0, 0.02)]
@@ -91,17 +91,19 @@ def test_draws_do_not_depend_on_the_units() -> None:
 
     mixed = np.outer(1 / units, 1 / units).ravel()
     in_mm = Quartic(coefficients_of(T), gram=nominal.gram * np.outer(mixed, mixed))
-    one = draw_surface(nominal, np.random.default_rng(5))
-    other = draw_surface(in_mm, np.random.default_rng(5))
+    one = SurfaceDraws(nominal).draw(np.random.default_rng(5))
+    other = SurfaceDraws(in_mm).draw(np.random.default_rng(5))
     F = nominal.wrench(V)
     np.testing.assert_allclose(other.value(F * units), one.value(F), rtol=1e-6)
 
 
 def test_the_same_stream_gives_the_same_surface() -> None:
     for nominal in (Ellipsoid(A), QUARTICS["square"]):
-        one, other = (draw_surface(nominal, np.random.default_rng(3)).value([1, 2, 0.01]) for _ in range(2))
+        one, other = (
+            SurfaceDraws(nominal).draw(np.random.default_rng(3)).value([1, 2, 0.01]) for _ in range(2)
+        )
         assert one == other
-        near = draw_surface(nominal, np.random.default_rng(3), df=1e8).value([1, 2, 0.01])
+        near = SurfaceDraws(nominal, 1e8).draw(np.random.default_rng(3)).value([1, 2, 0.01])
         assert near == pytest.approx(nominal.value([1, 2, 0.01]), rel=1e-2)
 
 
@@ -124,7 +126,7 @@ def test_loads_vary_within_their_part() -> None:
 )
 def test_what_cannot_be_drawn(surface, df, message) -> None:
     with pytest.raises(InputError, match=message):
-        draw_surface(surface, np.random.default_rng(0), df)
+        SurfaceDraws(surface, df).draw(np.random.default_rng(0))
 
 
 def test_loads_that_cannot_be_drawn() -> None:

@@ -11,6 +11,7 @@ from flatpush.control.learning.belief import Place, SteeringBelief, _signal
 from flatpush.control.loop.limits import Limits, braking
 from flatpush.control.loop.measurement import STOP, Command, Measurement
 from flatpush.experiments.feedback import task
+from flatpush.geometry import transform, velocity_at
 
 
 @pytest.mark.parametrize("bend", [10.0, -10.0])
@@ -51,7 +52,8 @@ def test_whatever_is_wanted_the_limits_hold():
         spinning = Command(np.array([0.0, 0.0, 9.0]))
         wanted = Command(rng.normal(size=3) * [0.05, 0.05, 3.0]) if k % 100 < 50 else spinning
         last = limits.kept(last, 0.0, wanted, yaw, dt)
-        tips = limits.tip_velocities(last.velocity, yaw)
+        arms = transform([0.0, 0.0, yaw], limits.tips)
+        tips = velocity_at(last.velocity, arms)
         assert np.max(np.hypot(*tips.T)) <= 0.02
         assert np.max(np.hypot(*(tips - before).T)) <= 0.1 * dt
         assert abs(last.velocity[2]) <= np.pi / 2

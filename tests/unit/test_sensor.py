@@ -53,7 +53,8 @@ def test_instants_that_nobody_showed_are_not_made_up():
     state, frames = sensor.arrived(state, 0.57)
     assert [frame.time for frame in frames] == [0.0, 0.57]
     assert np.array_equal(frames[1].object, POSE + 1.0)
-    assert sensor.instant(state) == 0.6
+    assert sensor.arrived(sensor.expose(state, 0.59, POSE, HAND), 0.59)[1] == ()
+    assert len(sensor.arrived(sensor.expose(state, 0.6, POSE, HAND), 0.6)[1]) == 1
 
 
 def test_the_same_generator_gives_the_same_frames():

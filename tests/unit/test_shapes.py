@@ -9,10 +9,14 @@ from numpy.typing import ArrayLike
 from flatpush.documents import load_scene
 from flatpush.documents.contours import outer_contour
 from flatpush.documents.drawing import Curve, Drawing
-from flatpush.documents.shapes import load_outline
+from flatpush.documents.shapes import load_drawing
 from flatpush.errors import InputError, MissingExtra
 
 MM = 1e-3
+
+
+def load_outline(path, unit):
+    return load_drawing(path, unit).outline
 
 
 def svg(folder: Path, body: str, attributes: str = "") -> Path:

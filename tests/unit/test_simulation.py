@@ -86,7 +86,7 @@ def test_two_fingers_slip_without_friction_enough(two_finger_plan, triangle):
 
 def test_two_fingers_straighten_a_start_that_is_off(two_finger_plan):
     """They land on an object that is turned and shifted; each finger touches when it meets the edge, and both stick."""
-    noise = fp.Perturbation(position=0.0003, angle=np.deg2rad(1.0), friction=0.0)
+    noise = fp.Noise(position=0.0003, angle=np.deg2rad(1.0), friction=0.0)
     for seed in range(5):
         rollout = fp.simulate(two_finger_plan, seed, perturbation=noise)
         assert rollout.outcome == "completed"
@@ -131,12 +131,12 @@ def test_a_late_touch_pushes_the_object_from_where_it_is(one_finger_plan):
 
 
 def test_perturbed_runs_are_seeded(one_finger_plan):
-    noise = fp.Perturbation()
+    noise = fp.Noise()
     a, b, c = (fp.simulate(one_finger_plan, seed, perturbation=noise) for seed in (1, 1, 2))
     assert np.array_equal(a.object, b.object)
     assert not np.array_equal(a.final_pose, c.final_pose)
     with pytest.raises(InputError, match="0 or more"):
-        fp.Perturbation(friction=-1)
+        fp.Noise(friction=-1)
 
 
 def test_the_finger_that_keeps_its_direction_rolls(rectangle):

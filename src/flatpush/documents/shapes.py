@@ -57,11 +57,6 @@ class DrawnOutline:
     tolerance: float
 
 
-def load_outline(path: str | os.PathLike[str], unit: float, choice: Choice | None = None) -> Outline:
-    """The outline drawn in a file, as load_drawing reads it."""
-    return load_drawing(path, unit, choice).outline
-
-
 def load_drawing(path: str | os.PathLike[str], unit: float, choice: Choice | None = None) -> DrawnOutline:
     """The outline drawn in an SVG or DXF file or seen in a bitmap, a polygon whose y axis points up [m].
 

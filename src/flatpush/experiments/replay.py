@@ -162,9 +162,6 @@ def fitted_on(recordings: list[Recording], given: Setup) -> Parameters:
     return fit_to_ends(recordings, given, contact_calibration(recordings, given))
 
 
-Predict = Callable[[Recording, Setup, Parameters], Replayed]
-
-
 def judged(
     title: str,
     fitted: str,

@@ -26,30 +26,25 @@ _RANGE = 1e-8  # eigenvalues of Q below this part of the largest count as zero: 
 _WITHIN_BOUNDARY = 1 - 1e-9
 
 
-def draw_surface(surface: LimitSurface, rng: np.random.Generator, df: float = DF) -> LimitSurface:
-    """A random ellipsoid or quartic whose mean is the given one.
+@dataclass(frozen=True, eq=False)
+class SurfaceDraws:
+    """Random ellipsoids or quartics whose mean is a nominal one. What draws share is computed once.
 
     Relative standard deviations of an ellipsoid's diagonal are √(2/df): 20 % at 50, 4.5 % at 1000. A draw is the same
     surface in all units.
 
-    Args:
-        surface: an Ellipsoid or a Quartic.
+    Attributes:
+        surface: the nominal one, an Ellipsoid or a Quartic.
         df: degrees of freedom, any number of at least 3 (ellipsoid) or 9 (quartic); the larger, the nearer.
 
     Raises:
         InputError: for another surface or too few degrees of freedom.
 
     >>> sphere = Ellipsoid(np.eye(3))
-    >>> drawn = draw_surface(sphere, np.random.default_rng(0), df=1e6)
+    >>> drawn = SurfaceDraws(sphere, df=1e6).draw(np.random.default_rng(0))
     >>> bool(np.max(np.abs(drawn.matrix - np.eye(3))) < 0.01)
     True
     """
-    return SurfaceDraws(surface, df).draw(rng)
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceDraws:
-    """Draws from one nominal surface; see draw_surface. What they share is computed once."""
 
     surface: LimitSurface
     df: float = DF

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ..arguments import finite, vector
 from ..errors import FlatpushError, InputError
 from ..geometry.pose import Array
-from .sos import best_gram, coefficients_of, gram_defect, tensor, tensor_of_gram
+from .sos import best_gram, gram_defect, tensor
 from .surface import LimitSurface
 
 if TYPE_CHECKING:
@@ -82,18 +82,6 @@ class Quartic(LimitSurface):
         for name, array in keep.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-
-    @classmethod
-    def from_gram(cls, gram: ArrayLike) -> "Quartic":
-        """The quartic whose Hessian has this Gram matrix (9, 9).
-
-        Raises:
-            InputError: if no quartic has it, or it is not positive semidefinite.
-        """
-        Q = np.array(gram, dtype=float)
-        if Q.shape != (9, 9) or not np.isfinite(Q).all():
-            raise InputError("a Gram matrix is 9 × 9 finite numbers", value=gram)
-        return cls(coefficients_of(tensor_of_gram(Q)), gram=Q)
 
     def value(self, wrench: ArrayLike) -> Array:
         F = self._balanced(wrench)

@@ -98,11 +98,6 @@ class Planner:
         other._progress = progress
         return other
 
-    def improving(self, start: ArrayLike | None = None) -> Iterator[Plan]:
-        """Plans that get better, the first one at once; plan() is the last of them."""
-        for answer in self.answers(start):
-            yield answer.plan()
-
     def answers(self, start: ArrayLike | None = None) -> Iterator[Answer]:
         """Better and better answers, each as soon as it is found and certified only when its plan is called for.
 

@@ -4,7 +4,7 @@ Nothing here imports steering or planning: a mistake there shows as a failed cla
 """
 
 from .claims import certify, clearance_of
-from .noise import Noise, Perturbation
+from .noise import Noise
 from .proof import Proof, prove
 from .rollout import simulate
 from .study import Runs, study
@@ -13,7 +13,6 @@ from .verify import Claim, Report, verify
 __all__ = [
     "Claim",
     "Noise",
-    "Perturbation",
     "Proof",
     "Report",
     "Runs",

@@ -60,9 +60,6 @@ class Noise:
             raise InputError("a Wishart draw has at least 3 degrees of freedom", key="df", value=self.df)
 
 
-Perturbation = Noise  # of a single run, by its older name
-
-
 class Disturbances:
     """Disturbed scenes of one plan: each is a function of the seed and of its number alone.
 

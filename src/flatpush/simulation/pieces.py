@@ -39,13 +39,11 @@ class Piece:
     lifted: bool
     height: float = 0.0
 
-    def object_at(self, fraction: float) -> Array:
-        """X_WO as planned, at a fraction of the piece."""
-        return self._at(self.object, self.object_step, fraction)
-
     def pusher_at(self, fraction: float) -> Array:
-        """X_WE as planned."""
-        return self._at(self.pusher, self.pusher_step, fraction)
+        """X_WE as planned, at a fraction of the piece."""
+        if self.body:
+            return compose(self.pusher, exp(fraction * self.pusher_step))
+        return self.pusher + fraction * self.pusher_step
 
     def pusher_velocity(self, fraction: float) -> Array:
         """Velocity (x, y) of E's origin in W and its yaw rate, per whole piece, shape (3,)."""
@@ -55,9 +53,6 @@ class Piece:
         c, s = np.cos(theta), np.sin(theta)
         vx, vy, w = self.pusher_step
         return np.array([c * vx - s * vy, s * vx + c * vy, w])
-
-    def _at(self, pose: Array, step: Array, fraction: float) -> Array:
-        return compose(pose, exp(fraction * step)) if self.body else pose + fraction * step
 
 
 def pieces(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...formulas import formula
-from ...geometry import pose_error, transform
+from ...geometry import pose_error
 from ...geometry.pose import Array
 from ...problem import Pusher
 from .measurement import Command, Measurement
@@ -157,11 +157,6 @@ class Limits:
         speed = min(0.95 * most, now + gain * dt, braking(length, gain, dt))
         rates = speed * way
         return Command(rates[:3], max(0.0, height + float(rates[3]) * dt))
-
-    def tip_velocities(self, velocity: Array, yaw: float) -> Array:
-        """Of the fingertips in W, shape (k, 2), for a velocity of the hand (3,) at a yaw."""
-        arms = transform([0.0, 0.0, yaw], self.tips)
-        return np.asarray(velocity[:2] + velocity[2] * np.stack([-arms[:, 1], arms[:, 0]], axis=1))
 
 
 def braking(length: float, deceleration: float, dt: float) -> float:

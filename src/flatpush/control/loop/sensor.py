@@ -107,10 +107,6 @@ class SimulatedSensor(AbstractSensor):
     def start(self) -> SensorState:
         return SensorState()
 
-    def instant(self, state: SensorState) -> float:
-        """When the next frame will be taken [s]."""
-        return state.next_frame / self.camera.rate
-
     def expose(self, state: SensorState, time: float, object: ArrayLike, pusher: ArrayLike) -> SensorState:
         """Shows the object X_WO and the pusher X_WE at a time [s]; a frame is taken if one is due.
 
