@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flatpush.contact import PointContact
+from flatpush.contact import ContactMode, PointContact
 from flatpush.errors import InputError, NoDubinsReduction
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, cross, exp, perpendicular, rotate
@@ -64,6 +64,28 @@ def flat_motion(contact, surface, flat, poses, forces, rates):
     v, dv = V[:, :2] + V[:, 2:] * arm, dV[:, :2] + dV[:, 2:] * arm
     theta = poses[:, 2]
     return flat.position(poses), rotate(theta, v), rotate(theta, dv + V[:, 2:] * perpendicular(v))
+
+
+def test_the_equations_of_motion():
+    """Eqs. 4-9 and 12-14, component by component, for forces at a contact r below the centre of friction."""
+    contact, p_y = paper_contact(), -r
+    J = np.array([[1.0, 0.0, -p_y], [0.0, 1.0, 0.0]])
+    A = np.diag([a, a, b])
+    for fx, fy in ((0.1, 1.0), (-0.3, 0.8), (0.0, 0.5)):
+        V = PAPER.twist(contact.wrench([fx, fy]))  # up to a positive factor, which f absorbs
+        V *= fy * a / V[1]
+        np.testing.assert_allclose(V, [a * fx, a * fy, -b * p_y * fx], rtol=1e-12, atol=1e-15)  # Eqs. 4-6
+        theta = 0.7
+        x = a * (fx * np.cos(theta) - fy * np.sin(theta))  # Eqs. 7-9
+        y = a * (fx * np.sin(theta) + fy * np.cos(theta))
+        np.testing.assert_allclose([*rotate(theta, V[:2]), V[2]], [x, y, -b * p_y * fx], rtol=1e-12)
+        u = J @ A @ J.T @ [fx, fy]  # Eq. 13
+        motion = contact.motion(PAPER, u)
+        assert motion.mode == ContactMode.STICKING
+        np.testing.assert_allclose(motion.twist, V, rtol=1e-9, atol=1e-12)
+    for edge, force in zip(contact.motion_cone(PAPER), ((-mu, 1.0), (mu, 1.0)), strict=True):
+        wanted = J @ A @ J.T @ force  # Eq. 14
+        np.testing.assert_allclose(edge / np.hypot(*edge), wanted / np.hypot(*wanted), rtol=1e-12)
 
 
 @pytest.mark.parametrize("frame", [0.0, 1.1, -2.5])

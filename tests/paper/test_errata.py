@@ -1,0 +1,131 @@
+"""docs/errata.md, rows 2 and 11 to 15: what is computed holds, and what is printed does not."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+
+from flatpush.contact import PointContact
+from flatpush.control.laws.formulas import AFTER, AxisGains, Bounds, FlatPose, FlatTarget, linearised
+from flatpush.control.laws.gains import Gains
+from flatpush.experiments import fig4
+from flatpush.friction import Ellipsoid
+from flatpush.geometry import rotate
+from flatpush.steering import flat_output
+
+HEADING, SPEED, DT = 0.4, 0.02, 1e-6
+BOUNDS = Bounds(
+    30.0, 30.0, 1e-3, 1.0
+)  # turn per length to either side [1/m], least and most flat speed [m/s]
+
+
+def acceleration(
+    target: FlatTarget, gains: AxisGains, speed: float = SPEED
+) -> tuple[np.ndarray, float, bool]:
+    """z̈ of the flat point at the origin in a tick of the law, how far its turn was scaled, whether s was bounded."""
+    after, _, omega, scale, bounded = linearised(
+        FlatPose(0.0, 0.0, HEADING), speed, target, gains, BOUNDS, DT, AFTER
+    )
+    h = rotate(HEADING, [1.0, 0.0])
+    return (after * rotate(omega * DT, h) - speed * h) / DT, scale, bounded
+
+
+def test_row_2_the_acceleration_of_the_reference_is_fed_forward_not_its_velocity() -> None:
+    z_d, dz_d, ddz_d = np.array([1e-4, -2e-4]), np.array([0.018, 0.009]), np.array([0.002, 0.001])
+    kp, kd = np.array([2.0, 0.5]), np.array([0.1, 0.05])
+    found, scale, bounded = acceleration(FlatTarget(*z_d, *dz_d, *ddz_d), AxisGains(*kp, *kd))
+    assert scale == 1.0
+    assert not bounded
+    feedback = -kp * (0.0 - z_d) - kd * (SPEED * rotate(HEADING, [1.0, 0.0]) - dz_d)
+    np.testing.assert_allclose(found, ddz_d + feedback, atol=1e-7)
+    assert np.hypot(*(found - (dz_d + feedback))) > 0.5 * SPEED  # as printed
+
+
+def test_row_11_the_law_is_not_linear_at_rest_nor_outside_the_cone() -> None:
+    gains = AxisGains(4.0, 4.0, 4.0, 4.0)
+    ahead = rotate(HEADING, [0.0, 1e-4])
+    wanted = 4.0 * ahead + 4.0 * SPEED * rotate(HEADING, [1.0, 0.0])
+    target = FlatTarget(*ahead, *(2 * SPEED * rotate(HEADING, [1.0, 0.0])), 0.0, 0.0)
+    found, scale, bounded = acceleration(target, gains)
+    np.testing.assert_allclose(found, wanted, rtol=1e-4)
+    _, _, bounded = acceleration(target, gains, speed=0.0)
+    assert bounded  # Eq. 45 divides by the flat speed
+    far = FlatTarget(*(1e3 * ahead), *(SPEED * rotate(HEADING, [1.0, 0.0])), 0.0, 0.0)
+    found, scale, _ = acceleration(far, gains)
+    assert scale < 0.5
+    assert abs(found @ rotate(HEADING, [0.0, 1.0])) < 0.5 * 4e3 * np.hypot(*ahead)
+
+
+def test_row_12_the_printed_gains_leave_millimetres_after_30_seconds() -> None:
+    left = []
+    for kp, kd in zip(*fig4.PAPER_GAINS, strict=True):
+        poles = np.roots([1.0, kd, kp])
+        assert np.all(np.abs(poles.imag) > 10 * np.abs(poles.real))
+        left.append(np.exp(30.0 * poles.real.max()))
+    np.testing.assert_allclose(left, [0.22, 0.47], atol=0.005)
+    error = fig4.tracked(Gains(*map(np.array, fig4.PAPER_GAINS)), fig4.NOMINAL)
+    assert 0.2 * np.hypot(1.0, 2.5) < 1e3 * fig4.flat_error(error) < 0.5 * np.hypot(1.0, 2.5)
+    assert 1e3 * fig4.flat_error(error) > 100 * np.hypot(0.0034, 0.0012)  # as printed, in millimetres
+
+
+def test_row_13_signed_errors_cancel(data_folder) -> None:
+    """Over the logs that are there; the paper's figure is over all 61."""
+    with open(data_folder / "robot_exp_logs" / "summary_runs.csv", newline="", encoding="utf-8") as file:
+        errors = np.array(
+            [
+                [float(row[f"err_{name}"]) for name in ("x_mm", "y_mm", "theta_deg")]
+                for row in csv.DictReader(file)
+            ]
+        )
+    assert len(errors) > 30
+    assert np.hypot(*errors[:, :2].mean(axis=0)) < 0.85 * np.hypot(*errors[:, :2].T).mean()
+    assert abs(errors[:, 2].mean()) < 0.5 * np.abs(errors[:, 2]).mean()
+
+
+def test_row_14_two_signs_of_the_caption_of_fig_6(data_folder) -> None:
+    with open(
+        data_folder / "robot_exp_logs" / "compare_with_paper.csv", newline="", encoding="utf-8"
+    ) as file:
+        rows = [
+            row for row in csv.DictReader(file) if row["object"] == "bigrect_3pts" and row["subset"] == "all"
+        ]
+    found = {
+        (row["start_id"], row["component"]): (float(row["mean"]), float(row["paper_mean"])) for row in rows
+    }
+    for start, component in (("0", "theta_deg"), ("2", "x_mm")):
+        logged, printed = found[start, component]
+        assert printed == pytest.approx(-logged, abs=0.006)
+
+
+def test_row_15_a_contact_with_c_needs_the_flat_speed_as_the_compensator_s_state() -> None:
+    a, b, r = 1.3, 2400.0, 0.021
+    surface = Ellipsoid(np.diag([a, a, b]))
+    flat = flat_output(PointContact([0.0, -r], rotate(0.15, [0.0, 1.0]), 0.45), surface)
+    c, s, omega = flat.along, 0.02, 0.3
+    assert abs(c) > 1e-3
+    force_x = omega / (b * r)
+
+    def speed(force_y: float) -> float:
+        """Of the flat point along +y, by V = A Jᵀ f."""
+        V = surface.matrix @ [force_x, force_y, r * force_x]
+        return float(V[1] + V[2] * c)
+
+    assert speed((s - c * omega) / a) == pytest.approx(s, rel=1e-12)
+    assert abs(speed(s / a) - s) > 0.05 * s  # Eqs. 43-45 as they stand, ζ = s/a
+
+
+def test_every_row_that_is_cited_is_there() -> None:
+    from pathlib import Path
+
+    root = Path(__file__).parents[2]
+    table = (root / "docs" / "errata.md").read_text(encoding="utf-8")
+    rows = {int(number) for number in re.findall(r"^\| (\d+) \|", table, re.M)}
+    cited: set[int] = set()
+    for path in (*root.glob("src/**/*.py"), *root.glob("tests/**/*.py"), *root.glob("docs/*.md")):
+        for listed in re.findall(
+            r"[Ee]rrata(?:\.md\)?)?,? (?:rows? )?((?:\d+(?:, | and )?)+)", path.read_text("utf-8")
+        ):
+            cited |= {int(number) for number in re.findall(r"\d+", listed)}
+    assert cited >= {1, 2, 11, 12, 15}
+    assert cited <= rows == set(range(1, 17))
