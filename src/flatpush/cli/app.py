@@ -10,7 +10,21 @@ import typer
 
 from .. import compiling
 from ..errors import FlatpushError
-from . import describe, experiment, export, identify, init, plan, run, simulate, track, verify, view
+from . import (
+    calibrate,
+    describe,
+    experiment,
+    export,
+    identify,
+    init,
+    plan,
+    replay,
+    run,
+    simulate,
+    track,
+    verify,
+    view,
+)
 from .common import CompilingNotice
 
 app = typer.Typer(
@@ -30,6 +44,8 @@ app.command("export")(export.command)
 app.command("track")(track.command)
 app.command("run")(run.command)
 app.command("identify")(identify.command)
+app.command("calibrate")(calibrate.command)
+app.command("replay")(replay.command)
 app.command("init")(init.command)
 app.command("view")(view.command)
 app.command("experiment")(experiment.command)

@@ -86,7 +86,11 @@ def fit_motion(
     Raises:
         InputError: as motion.look.
     """
-    seen = look(motions, thing.outline, tip_radius)
+    return fit_seen(look(motions, thing.outline, tip_radius), thing, tip_radius, known_support=known_support)
+
+
+def fit_seen(seen: Seen, thing: Object, tip_radius: float, *, known_support: bool = True) -> MotionFit:
+    """The same from what recordings hold, as motion.look or motion.seen_of gives it."""
     places, expected = thing.support.feet
     if known_support and len(places):
         return _fitted(KnownFeet(places, expected), None, seen, thing, tip_radius)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..documents.motion_file import Motion
 from ..errors import InputError
-from ..geometry import Outline, perpendicular, rotate, wrap_angle
+from ..geometry import Outline, compose, exp, log, perpendicular, relative, rotate, wrap_angle
 from ..geometry.pose import Array
 
 # Way of the finger from which a pose and its velocity are taken (a local quadratic), and of one stretch [m].
@@ -246,3 +246,22 @@ def _cut(part: Frames, motion: Motion, a: int, push: int) -> list[tuple[Array, A
         else:
             i += max(1, (j - i) // 4)
     return found
+
+
+def seen_of(stretches: Stretches, outline: Outline, tip_radius: float, noise: tuple[float, float]) -> Seen:
+    """What stretches say of which only both ends were measured; the moment in the middle stands for each.
+
+    Args:
+        noise: standard deviation of an end's place [m] and angle [rad].
+    """
+    step = relative(stretches.starts, stretches.ends)
+    way = np.hypot(*(stretches.tips[:, -1] - stretches.tips[:, 0]).T)
+    twists = log(np.column_stack([step[:, :2], wrap_angle(step[:, 2])]))
+    poses = compose(stretches.starts, exp(0.5 * twists))
+    tips = stretches.tips.mean(axis=1)
+    touch = [touching(outline, q, t, tip_radius) for q, t in zip(poses, tips, strict=True)]
+    points, normals, gaps, corner = (np.array(column) for column in zip(*touch, strict=True))
+    slides = rotate(-poses[:, 2], (stretches.tips[:, -1] - stretches.tips[:, 0]) / way[:, None])
+    variance = np.ones(len(way))
+    frames = Frames(poses, variance, twists / way[:, None], tips, slides, points, normals, corner, way, gaps)
+    return Seen(frames, stretches, noise, ())

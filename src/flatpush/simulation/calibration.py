@@ -38,12 +38,23 @@ class Setup:
     Attributes:
         objects: by the name that the logs give them. fingers: in E, shape (k, 2) [m]. tip_radius: [m].
         pivot: of the camera's map, somewhere amid the runs, shape (2,) [m].
+        tags: which tag an object carries, where several objects are one block with one tag; else each has its own.
     """
 
     objects: Mapping[str, Object]
     fingers: Array
     tip_radius: float
     pivot: Array
+    tags: Mapping[str, str] = field(default_factory=dict)
+
+    def tag(self, name: str) -> str:
+        """The tag of an object."""
+        return self.tags.get(name, name)
+
+    @property
+    def tag_names(self) -> list[str]:
+        """All tags, in the order of the objects."""
+        return list(dict.fromkeys(self.tag(name) for name in self.objects))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +63,7 @@ class Parameters:
 
     Attributes:
         camera: matrix minus identity, row by row, and shift [m], shape (6,).
-        tags: of each object, see Registration (3,).
+        tags: of each tag, see Registration (3,).
         inset: so much less than the tip radius the fingers keep from the outline [m].
         friction: between finger and object; None: the objects' own.
         lag: see replay.trajectory_errors [s].
@@ -68,7 +79,7 @@ class Parameters:
         matrix = np.eye(2) + np.reshape(self.camera[:4], (2, 2))
         return Registration(
             CameraMap(matrix, np.asarray(self.camera[4:]), setup.pivot),
-            np.asarray(self.tags.get(name, np.zeros(3))),
+            np.asarray(self.tags.get(setup.tag(name), np.zeros(3))),
         )
 
     def plant(self, setup: Setup, name: str) -> Plant:
@@ -92,31 +103,21 @@ def contact_calibration(recordings: Sequence[Recording], setup: Setup, tags: boo
     """
     from scipy.optimize import least_squares
 
-    stretches = [stretch for recording in recordings for stretch in _stretches(recording)]
+    stretches = [stretch for recording in recordings for stretch in contact_stretches(recording)]
     if not stretches:
         raise InputError("no stroke is long enough to tell of the contact", value=len(recordings))
-    outlines = {name: _Distance(thing) for name, thing in setup.objects.items()}
-    names = list(setup.objects)
+    outlines = distances(setup)
+    names = setup.tag_names
     most = 6 + 3 * len(names) * tags
 
     def parameters(x: Array) -> Parameters:
-        return replace(_shared(x, names if tags else []), lag=0.16 + 0.02 * float(x[most]))
+        return replace(shared_parameters(x, names if tags else []), lag=0.16 + 0.02 * float(x[most]))
 
     def residuals(x: Array) -> Array:
         p = parameters(x)
         found = [PULL_CONTACT * x]
         for stretch in stretches:
-            registration = p.registration(setup, stretch.name)
-            hands = np.column_stack(
-                [np.interp(stretch.times - p.lag, stretch.clock, h) for h in stretch.hands.T]
-            )
-            poses = registration.poses(stretch.poses)
-            in_object, in_hand = relative(poses, hands), relative(hands, poses)
-            weight = 1000 / np.sqrt(len(poses))
-            for finger in setup.fingers:
-                gaps = outlines[stretch.name](transform(in_object, finger)) - setup.tip_radius
-                found.append(weight * gaps)
-            found.append(0.5 * weight * (in_hand[:, 1] - np.median(in_hand[:, 1])))
+            found.append(contact_gaps(stretch, p, setup, outlines[stretch.name]))
         return np.concatenate(found)
 
     # Shifted by one, so that the steps of the derivatives are alike.
@@ -127,6 +128,23 @@ def contact_calibration(recordings: Sequence[Recording], setup: Setup, tags: boo
     return parameters(fit.x - 1)
 
 
+def contact_gaps(stretch: "Stretch", p: Parameters, setup: Setup, outline: "Distance") -> Array:
+    """How far each finger is from touching, and the object from its place in the hand; root mean squares in mm."""
+    registration = p.registration(setup, stretch.name)
+    hands = np.column_stack([np.interp(stretch.times - p.lag, stretch.clock, h) for h in stretch.hands.T])
+    poses = registration.poses(stretch.poses)
+    in_object, in_hand = relative(poses, hands), relative(hands, poses)
+    weight = 1000 / np.sqrt(len(poses))
+    reach = setup.tip_radius - p.inset
+    gaps = [weight * (outline(transform(in_object, finger)) - reach) for finger in setup.fingers]
+    return np.concatenate([*gaps, 0.5 * weight * (in_hand[:, 1] - np.median(in_hand[:, 1]))])
+
+
+def distances(setup: Setup) -> dict[str, "Distance"]:
+    """Of each object's outline."""
+    return {name: Distance(thing) for name, thing in setup.objects.items()}
+
+
 def fit_to_ends(recordings: Sequence[Recording], setup: Setup, start: Parameters) -> Parameters:
     """Camera map, tags, inset and friction with which the simulator comes nearest to the measured ends of all pushes.
 
@@ -135,11 +153,11 @@ def fit_to_ends(recordings: Sequence[Recording], setup: Setup, start: Parameters
     """
     from scipy.optimize import least_squares
 
-    names = list(setup.objects)
+    names = setup.tag_names
 
     def parameters(x: Array) -> Parameters:
         inset, friction = INSET * float(x[-2]), max(0.05, STICKING + FRICTION * float(x[-1]))
-        return replace(_shared(x, names), inset=inset, friction=friction, lag=start.lag)
+        return replace(shared_parameters(x, names), inset=inset, friction=friction, lag=start.lag)
 
     def residuals(x: Array) -> Array:
         p = parameters(x)
@@ -149,7 +167,7 @@ def fit_to_ends(recordings: Sequence[Recording], setup: Setup, start: Parameters
             name = recording.run.object
             registration = p.registration(setup, name)
             run = replay(recording, plants[name], registration)
-            ends = np.array([poses[-1] for poses in run.poses]) - registration.poses(_ends(recording))
+            ends = np.array([poses[-1] for poses in run.poses]) - registration.poses(measured_ends(recording))
             ends[:, 2] = LEVER * wrap_angle(ends[:, 2])
             ends[:-1] *= INNER
             found.append(1000 * np.nan_to_num(ends).ravel())
@@ -165,13 +183,13 @@ def fit_to_ends(recordings: Sequence[Recording], setup: Setup, start: Parameters
     return parameters(fit.x - 1)
 
 
-def _shared(x: Array, names: Sequence[str]) -> Parameters:
+def shared_parameters(x: Array, names: Sequence[str]) -> Parameters:
     """Camera and tags from numbers of order one."""
     tags = {name: TAG * x[6 + 3 * k : 9 + 3 * k] for k, name in enumerate(names)}
     return Parameters(x[:6] * ([CAMERA] * 4 + [SHIFT] * 2), tags)
 
 
-def _ends(recording: Recording) -> Array:
+def measured_ends(recording: Recording) -> Array:
     """The last measured pose of each stroke, nan where the object was never seen, shape (n, 3)."""
     run, found = recording.run, []
     for a, b in recording.strokes:
@@ -182,7 +200,7 @@ def _ends(recording: Recording) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Stretch:
+class Stretch:
     """Rows in which a push was under way: the hand with its clock, and the new frames with their times."""
 
     name: str
@@ -192,7 +210,7 @@ class _Stretch:
     poses: Array
 
 
-def _stretches(recording: Recording) -> list[_Stretch]:
+def contact_stretches(recording: Recording) -> list[Stretch]:
     run, found = recording.run, []
     for (a, b), hands in zip(recording.strokes, recording.hands, strict=True):
         clock, poses = run.times[a:b], run.poses[a:b]
@@ -200,11 +218,11 @@ def _stretches(recording: Recording) -> list[_Stretch]:
         new = np.concatenate([[True], np.any(np.diff(poses, axis=0) != 0, axis=1)])
         rows = np.flatnonzero(run.seen[a:b] & new & (way > SETTLED) & (clock < clock[-1] - ENDING))[::EVERY]
         if len(rows) > 5:
-            found.append(_Stretch(run.object, clock, hands, clock[rows], poses[rows]))
+            found.append(Stretch(run.object, clock, hands, clock[rows], poses[rows]))
     return found
 
 
-class _Distance:
+class Distance:
     """Signed distances of points (n, 2) in O from an object's outline, positive outside [m]."""
 
     def __init__(self, thing: Object) -> None:

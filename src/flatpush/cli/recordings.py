@@ -1,0 +1,76 @@
+"""What calibrate and replay read: logs of runs, and the scenes of their objects."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..geometry.pose import Array
+    from ..simulation.calibration import Setup
+    from ..simulation.replay import Recording
+
+
+def read_recordings(
+    logs: Sequence[Path], scenes: Sequence[Path], carried: Mapping[str, str], pivot: "Array | None" = None
+) -> "tuple[tuple[Recording, ...], Setup]":
+    """The runs in logs, and objects, fingers and tags.
+
+    One scene stands for all runs of a log that names no object, and for those of its name.
+
+    Args:
+        logs: files. scenes: one for each object, of one pusher.
+        carried: which tag an object carries, where several share one.
+        pivot: of the camera's map (2,) [m]; default: amid the runs.
+
+    Raises:
+        InputError: for a log or a scene that is none, scenes of different pushers or of one name.
+    """
+    from ..documents import load_robot_log, load_scene
+    from ..simulation.calibration import Setup
+    from ..simulation.replay import Recording
+
+    read = [(path, load_scene(path)) for path in scenes]
+    names = [scene.object.name for _, scene in read]
+    if len(set(names)) < len(names):
+        raise InputError("each scene has an object of a name of its own", key="object.name", value=names)
+    for path, scene in read[1:]:
+        if scene.pusher != read[0][1].pusher:
+            raise InputError("all scenes have the same pusher", source=str(path), key="pusher")
+    recordings = []
+    for log in logs:
+        found = load_robot_log(log).runs
+        for run in found:
+            alone = len(read) == 1 and run.object not in names and len({r.object for r in found}) == 1
+            recordings.append(Recording.of(replace(run, object=names[0]) if alone else run))
+    for one in recordings:
+        if one.run.object not in names:
+            raise InputError(
+                "a run is of an object that no scene describes",
+                value=one.run.object,
+                hint=f"Objects of the scenes: {', '.join(names)}. Give one --scene for each.",
+            )
+    for name in carried:
+        if name not in names:
+            raise InputError("--tag is of an object that no scene describes", value=name)
+    pusher = read[0][1].pusher
+    half = pusher.spacing / 2
+    fingers = np.array([[0.0, half], [0.0, -half]]) if pusher.fingers == 2 else np.zeros((1, 2))
+    middle = np.mean([one.final[:2] for one in recordings], axis=0) if pivot is None else pivot
+    objects = {scene.object.name: scene.object for _, scene in read}
+    return tuple(recordings), Setup(objects, fingers, pusher.tip_radius, middle, dict(carried))
+
+
+def carried_of(texts: Sequence[str] | None) -> dict[str, str]:
+    """OBJECT=TAG, as often as given."""
+    found = {}
+    for text in texts or ():
+        name, equals, tag = (part.strip() for part in text.partition("="))
+        if not (name and equals and tag):
+            raise InputError("--tag takes OBJECT=TAG", value=text)
+        found[name] = tag
+    return found
