@@ -158,6 +158,7 @@ def test_a_bitmap_gives_the_smooth_shape(tmp_path: Path, kind: str) -> None:
         ("uneven", "background of the bitmap is not plain"),
         ("neck", "thinner than three pixels"),
         ("point", "thinner than three pixels"),
+        ("shadow", "may be a shadow"),
     ],
 )
 def test_bad_bitmaps(tmp_path: Path, change: str, words: str) -> None:
@@ -175,6 +176,9 @@ def test_bad_bitmaps(tmp_path: Path, change: str, words: str) -> None:
     elif change == "point":  # was a traceback
         pixels[:] = 0
         pixels[100, 100] = 255
+    elif change == "shadow":  # half as dark as the object: a part of it was taken for the object
+        soft = np.mean([np.roll(pixels, (k, k), (0, 1)) for k in range(4, 24)], axis=0)
+        pixels = (200 - 0.28 * soft * (pixels == 0) - 0.55 * pixels).astype(np.uint8)
     else:
         pixels[:, :] = np.linspace(0, 255, pixels.shape[1]).astype(np.uint8)
     with pytest.raises(InputError, match=words) as caught:

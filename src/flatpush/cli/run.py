@@ -64,9 +64,10 @@ def command(
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
     frame = numbers(base_frame, 4, "--base-frame")
+    trusted = () if scene is None else scene_files(scene)
+    check_outputs([plan, *trusted], [log, figure])
     loaded = load_plan(plan)
-    inputs = *plan_files(plan, loaded.run), *(() if scene is None else scene_files(scene))
-    check_outputs(inputs, [log, figure])
+    check_outputs(plan_files(plan, loaded.run), [log, figure])
     if log is not None:
         check_log(log)
     if figure is not None:

@@ -14,6 +14,10 @@ TOLERANCE = 1.0  # of what is found, in pixels: half of it is the bitmap's own, 
 _BLUR = 1.0  # standard deviation of the blur that takes away the steps [pixels]
 _SIMPLE = 0.25  # corners that change the outline less are left out [pixels]
 _SPECK = 0.01  # what is smaller than this part of the object is dirt
+_SLACK, _BLURRED = (
+    0.25,
+    2,
+)  # the threshold may be off by this part, and edges are no wider than twice as many pixels
 _PLAIN = 0.1  # greatest spread of a plain background, as a part of its contrast with the object
 _MOST_PIXELS = 40_000_000
 _LEAST = 40  # corners of an outline that may be one of pixels, and pixels that it is across
@@ -30,7 +34,8 @@ def read_bitmap(path: str | os.PathLike[str]) -> tuple[Array, str, list[LeftOut]
     """
     source = os.fspath(path)
     contrast = _contrast(path, source)
-    inside = contrast > _threshold(contrast) if np.ptp(contrast) > 0 else np.zeros(contrast.shape, dtype=bool)
+    threshold = _threshold(contrast) if np.ptp(contrast) > 0 else np.inf
+    inside = contrast > threshold
     border = np.concatenate([inside[0], inside[-1], inside[:, 0], inside[:, -1]])
     if not inside.any() or inside.all():
         raise InputError("the bitmap shows no object", source=source, hint=_HINT)
@@ -50,6 +55,15 @@ def read_bitmap(path: str | os.PathLike[str]) -> tuple[Array, str, list[LeftOut]
             hint=_HINT,
         )
     whole = ndimage.binary_fill_holes(labels == large[0])
+    loose, strict = (ndimage.binary_fill_holes(contrast > k * threshold) for k in (1 - _SLACK, 1 + _SLACK))
+    doubtful = ndimage.binary_erosion(loose & ~strict, iterations=_BLURRED)
+    if int(doubtful.sum()) > 0.1 * _SPECK * int(whole.sum()):
+        y, x = ndimage.center_of_mass(doubtful)
+        raise InputError(
+            f"where the object ends is not clear around the pixel ({x:.0f}, {y:.0f}): there may be a shadow",
+            source=source,
+            hint=_HINT,
+        )
     left = []
     if count > 1:
         left.append(LeftOut(f"{count - 1} specks", "smaller than 1 % of the object"))

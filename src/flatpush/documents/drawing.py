@@ -9,6 +9,7 @@ from ..geometry.pose import Array
 
 # Curves become polygons within this part of their outline's size; ends nearer than that are joined.
 FLATNESS = 1e-4
+WIDE = 0.05  # of the size of a shape, from which on it is told that its line has a width
 _CHORDS = 4, 4096  # of one curve, at first and at most
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .drawing import FLATNESS, Curve, Drawing, LeftOut, Unreadable
+from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent
 from .reading import read_bytes
 
 if TYPE_CHECKING:
@@ -146,6 +146,10 @@ class _Reader:
             if points is not None:
                 aside = self.aside(entity, layer)
                 self.drawing.curves.append(Curve(points, place, layer, names, aside, self.clip))
+                width = entity.dxf.get("const_width", 0.0) if kind == "LWPOLYLINE" else 0.0
+                if width > WIDE * extent(points(np.inf)):
+                    told = f"half of the width of its line ({width:.3g} in all), beyond its middle"
+                    self.drawing.left_out.append(LeftOut(place, told))
 
     def unseen(self, entity: "DXFEntity", layer: str, frozen_only: bool) -> str:
         """Why an entity is not visible. An insert on a layer that is off shows what its block has on others."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .drawing import FLATNESS, Curve, Drawing, LeftOut, Unreadable, extent
+from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent
 from .reading import read_bytes
 from .svg_path import EllipticArc, Segment, Straight, subpaths, traced
 from .svg_style import GEOMETRY, Element, Rule, Unsupported, sheet_rules, style_of
@@ -325,6 +325,9 @@ class _Reader:
         place = element.place + (f" on layer {state.layer!r}" if state.layer else "")
         if filled and not stroked and self.is_paper(element, state):
             aside = "a white rectangle as large as the page"
+        dashes = [float(x) for x in _NUMBERS.findall(style.get("stroke-dasharray", ""))]
+        if stroked and not filled and any(dashes):
+            aside = f"a dashed line ({style['stroke-dasharray']})"
         marker = next((style[k] for k in ("marker-start", "marker-mid", "marker-end") if k in style), "none")
         if (
             stroked
@@ -339,6 +342,13 @@ class _Reader:
             if state.window is not None and not cut and not _within(points, state.window[0] * (1.0, -1.0)):
                 cut = f"it is cut off by {state.window[1]}"
             self.drawing.curves.append(Curve(points, place, state.layer, state.names, aside, cut))
+            if stroked and not aside:
+                scale = np.sqrt(abs(np.linalg.det(state.matrix[:, :2])))
+                width = scale * _width(style.get("stroke-width", "1"))
+                if width > WIDE * extent(points(np.inf)):
+                    self.left_out(
+                        element, f"half of the width of its line ({width:.3g} in all), beyond its middle"
+                    )
 
     def is_paper(self, element: Element, state: _State) -> bool:
         """Whether a shape is a white rectangle that covers the page."""

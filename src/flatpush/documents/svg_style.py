@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 INHERITED = (
-    "visibility", "fill", "stroke", "fill-opacity", "stroke-opacity", "stroke-width",
+    "visibility", "fill", "stroke", "fill-opacity", "stroke-opacity", "stroke-width", "stroke-dasharray",
     "marker-start", "marker-mid", "marker-end",
 )  # fmt: skip
 # Properties that tell what is seen, and where. A rule of a style sheet that touches none of these is not read.
