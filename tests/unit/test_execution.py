@@ -1,5 +1,6 @@
 """A plan on a robot: what is compared before the first command, what is watched in every cycle, and what is written."""
 
+import io
 import math
 from dataclasses import replace
 
@@ -304,8 +305,18 @@ def test_bags_hold_standard_messages(tmp_path):
     reader = pytest.importorskip("mcap.reader")
     typesys = pytest.importorskip("rosbags.typesys")
     path = tmp_path / "log.mcap"
+    left = []
+
+    def told(cycle):
+        # What a program that is killed now leaves.
+        if len(left) < 20:
+            left.append(path.read_bytes())
+
     with DryRun([0.0, 0.0, 0.03, 0.5]) as robot:
-        ended = stream(Played(straight(start=(0, 0, 0.03, 0.5)), 0.01), robot, robot.clock, path)
+        ended = stream(Played(straight(start=(0, 0, 0.03, 0.5)), 0.01), robot, robot.clock, path, told)
+    for count, data in enumerate(left, 1):
+        messages = list(reader.make_reader(io.BytesIO(data)).iter_messages(topics=["/flatpush/tool"]))
+        assert len(messages) == count
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     found = {}
     with path.open("rb") as file:

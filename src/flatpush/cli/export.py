@@ -10,7 +10,7 @@ from .common import numbers, print_json, tell_failed
 
 def command(
     plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
-    file: Annotated[Path, typer.Argument(help="CSV file to write.")],
+    file: Annotated[Path, typer.Argument(help="File to write: .csv, or .mod (RAPID).")],
     base_frame: Annotated[
         str | None,
         typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),
@@ -20,14 +20,15 @@ def command(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> int:
-    """Verify PLAN and write the pusher's timed poses as CSV: t [s], x, y, z [m], yaw [rad], segment."""
-    from ..documents import check_outputs, export_csv, load_plan, plan_files
+    """Verify PLAN and write the pusher's timed poses: t [s], x, y, z [m], yaw [rad], segment; or a RAPID module."""
+    from ..documents import check_outputs, export_csv, export_rapid, load_plan, plan_files
     from ..simulation import verify
 
-    if file.suffix.lower() != ".csv":
+    write = {".csv": export_csv, ".mod": export_rapid}.get(file.suffix.lower())
+    if write is None:
         from ..errors import InputError
 
-        raise InputError("export writes a .csv file", value=str(file))
+        raise InputError("export writes a .csv file, or a .mod file of RAPID for ABB", value=str(file))
     frame = numbers(base_frame, 4, "--base-frame")
     loaded = load_plan(plan)
     check_outputs(plan_files(plan, loaded.run), [file])
@@ -37,7 +38,7 @@ def command(
         typer.echo("the plan fails verification; nothing was written (--unverified writes it)", err=True)
         return 4
     why = ", ".join(claim.name for claim in failed)
-    rows = export_csv(loaded, file, None if frame is None else tuple(frame), unverified=why)
+    rows = write(loaded, file, None if frame is None else tuple(frame), unverified=why)
     if as_json:
         print_json({"file": str(file), "rows": rows, "verified": not failed})
     else:

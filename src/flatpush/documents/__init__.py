@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .atomic import check_outputs, check_writable, write_atomically
-    from .export import export_csv
+    from .export import export_csv, export_rapid
     from .files_read import as_read, plan_files, scene_files
     from .fitted_scene import save_fitted_scene
     from .motion_file import Motion, MotionFile, is_motion_file, load_motions, own_columns
@@ -37,6 +37,7 @@ __all__ = [
     "check_outputs",
     "check_writable",
     "export_csv",
+    "export_rapid",
     "is_motion_file",
     "load_motions",
     "load_pairs",
@@ -80,6 +81,7 @@ _HOME = {
     "check_outputs": "atomic",
     "check_writable": "atomic",
     "export_csv": "export",
+    "export_rapid": "export",
     "load_pairs": "pairs_file",
     "load_plan": "plan_file",
     "load_robot_log": "robot_log",

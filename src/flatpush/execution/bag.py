@@ -2,6 +2,7 @@
 
 import math
 import os
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, TracebackType
@@ -22,6 +23,8 @@ TOPICS = {
     "/flatpush/state": "std_msgs/msg/String",
 }
 FRAME = "table"
+# The end of an MCAP file without a summary: records DataEnd (15) and Footer (2), and the magic bytes.
+END = struct.pack("<BQI", 15, 4, 0) + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + b"\x89MCAP0\r\n"
 
 
 def load() -> tuple[ModuleType, ModuleType]:
@@ -40,17 +43,46 @@ def load() -> tuple[ModuleType, ModuleType]:
     return mcap.writer, rosbags.typesys
 
 
-class McapLog:
-    """Every cycle: target, tool and twist (of the target), the object where it is known, and text where that changes.
+class WholeFile:
+    """Bytes that always end as an MCAP file does: what is committed later is written over that end.
 
-    Messages are not kept back, so that a run that is killed leaves what was written.
+    So a program that is killed leaves a file that readers take, up to the last commit.
     """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._file = Path(path).open("wb", buffering=0)  # noqa: SIM115  # closed by close
+        self._waiting, self._at = bytearray(), 0
+
+    def write(self, data: bytes) -> int:
+        self._waiting += data
+        return len(data)
+
+    def tell(self) -> int:
+        return self._at + len(self._waiting)
+
+    def flush(self) -> None:
+        """Nothing is written before it is committed."""
+
+    def commit(self, end: bytes = END) -> None:
+        self._file.seek(self._at)
+        self._file.write(bytes(self._waiting) + end)
+        self._at += len(self._waiting)
+        self._waiting.clear()
+
+    def close(self) -> None:
+        self.commit(b"")
+        self._file.truncate(self._at)
+        self._file.close()
+
+
+class McapLog:
+    """Every cycle: target, tool and twist (of the target), the object where it is known, and text where it changes."""
 
     def __init__(self, path: str | os.PathLike[str], name: str) -> None:
         writer, typesys = load()
         store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
         self._types, self._encode = store.types, store.serialize_cdr
-        self._file = Path(path).open("wb")  # noqa: SIM115  # closed by __exit__
+        self._file = WholeFile(path)
         self._writer = writer.Writer(self._file, use_chunking=False)
         self._writer.start(profile="ros2", library="flatpush")
         self._writer.add_metadata("flatpush", {"object": name})
@@ -86,10 +118,15 @@ class McapLog:
         said = f"{cycle.leg}: {cycle.mode}"
         if said != self._said:
             self._said = said
-            self.end(said)
+            self._say(said)
+        self._file.commit()
 
     def end(self, outcome: str) -> None:
-        self._put("/flatpush/state", self._of("std_msgs/msg/String")(outcome))
+        self._say(outcome)
+        self._file.commit()
+
+    def _say(self, text: str) -> None:
+        self._put("/flatpush/state", self._of("std_msgs/msg/String")(text))
 
     def _of(self, kind: str) -> Callable[..., object]:
         made: Callable[..., object] = self._types[kind]
