@@ -14,7 +14,9 @@ def command(
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOGS…", help="Logs of runs, as run --log writes them.")
     ],
-    scene: Annotated[list[Path], typer.Option(metavar="SCENE", help="Of the object; once for each object.")],
+    scene: Annotated[
+        list[Path], typer.Option(metavar="SCENE", help="The scene of the object; once for each object.")
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the calibration (JSON).")
     ] = None,

@@ -10,15 +10,24 @@ from .common import print_json, telling
 
 
 def command(
-    names: Annotated[list[str] | None, typer.Argument(help="Which; without a name, they are listed.")] = None,
-    figures: Annotated[Path | None, typer.Option(help="Folder to draw figures into.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="NAME…", help="Which experiments; without a name they are listed."),
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw figures into this folder.")
+    ] = None,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of the recorded data, for those that read them.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where the recorded data are, for experiments that read them."),
     ] = None,
     runs: Annotated[
-        int | None, typer.Option(help="How many runs, for those with random ones; default: their own.")
+        int | None,
+        typer.Option(
+            metavar="N", help="How many runs, for experiments with random ones; by default their own."
+        ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of random runs.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of random runs.")] = None,
     seeds: Annotated[
         str | None, typer.Option(metavar="FIRST:END", help="Range of seeds, END not included, for push-t.")
     ] = None,

@@ -9,8 +9,8 @@ from .common import numbers, print_json, tell_failed
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
-    file: Annotated[Path, typer.Argument(help="File to write: .csv, or .mod (RAPID).")],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write: .csv, or .mod (RAPID).")],
     base_frame: Annotated[
         str | None,
         typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),

@@ -45,13 +45,21 @@ def command(
     ] = None,
     pool: Annotated[bool, typer.Option("--pool", help="One surface for all experiments together.")] = False,
     units: Annotated[
-        str, typer.Option(help="Of columns without a unit in their name: m, cm or mm, and rad or deg.")
+        str,
+        typer.Option(
+            metavar="UNITS", help="Units of columns that do not name them: m, cm or mm, and rad or deg."
+        ),
     ] = "m,rad",
     length: Annotated[
-        float | None, typer.Option(help="Characteristic length [m] of the angles; default: from the data.")
+        float | None,
+        typer.Option(
+            metavar="METRES", help="Length that weighs angles against places; by default from the data."
+        ),
     ] = None,
     folds: Annotated[int, typer.Option(metavar="N", help="Parts of the cross-validation.")] = 5,
-    seeds: Annotated[int, typer.Option(help="How many cross-validations, each shuffled anew.")] = 2,
+    seeds: Annotated[
+        int, typer.Option(metavar="N", help="How many cross-validations, each shuffled anew.")
+    ] = 2,
     skip_bad: Annotated[
         bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")
     ] = False,

@@ -16,7 +16,9 @@ def command(
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOGS…", help="Logs of runs, as run --log writes them.")
     ],
-    scene: Annotated[list[Path], typer.Option(metavar="SCENE", help="Of the object; once for each object.")],
+    scene: Annotated[
+        list[Path], typer.Option(metavar="SCENE", help="The scene of the object; once for each object.")
+    ],
     calibration: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="What calibrate wrote; without it nothing is corrected."),

@@ -31,23 +31,36 @@ COUNTDOWN = 3
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
     robot: Annotated[
-        str, typer.Option(help="Address, such as sim, dry-run or egm://HOST:PORT; docs/robots.md.")
+        str,
+        typer.Option(
+            metavar="ADDRESS", help="Which robot: sim, dry-run, egm://HOST:PORT or another of docs/robots.md."
+        ),
     ],
     scene: Annotated[
-        Path | None, typer.Option(help="The scene that is trusted; the plan must be for it.")
+        Path | None, typer.Option(metavar="SCENE", help="The scene that you trust; the plan must be for it.")
     ] = None,
-    controller: Annotated[str | None, typer.Option(help="path, dfl or horizon; default: open loop.")] = None,
-    log: Annotated[Path | None, typer.Option(help="Log to write: .csv or .mcap.")] = None,
-    speed: Annotated[float, typer.Option(help="In parts of the plan's, up to 1.")] = 1.0,
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Feedback by path, dfl or horizon; by default it goes open loop."),
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a log of every cycle as .csv or .mcap.")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(metavar="PART", help="How fast, as a part of the plan's speed, up to 1.")
+    ] = 1.0,
     base_frame: Annotated[
         str | None,
         typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of a simulated camera's noise.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise of a simulated camera.")] = 0,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a robot moves.")] = False,
-    figure: Annotated[Path | None, typer.Option(help="Planned against executed: .svg or .png.")] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw what was planned against what was done as .svg or .png."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C and SIGTERM stop the robot."""

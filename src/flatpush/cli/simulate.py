@@ -12,37 +12,67 @@ from .common import error_text, numbers, pose_text, print_json, telling, warn_un
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
-    runs: Annotated[int, typer.Option(help="How many; more than one disturbs start and friction.")] = 1,
-    seed: Annotated[int, typer.Option(help="Of the disturbances.")] = 0,
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
+    runs: Annotated[
+        int, typer.Option(metavar="N", help="How many runs; more than one disturbs start and friction.")
+    ] = 1,
+    seed: Annotated[
+        int, typer.Option(metavar="N", help="Seed of the disturbances; the same seed gives the same runs.")
+    ] = 0,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write every run here (JSON; many runs also .csv).")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write every run here (JSON; many runs also .csv)."
+        ),
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(help="Draw it: one run .svg, .png, .gif or .html; the tube of many .svg or .png."),
+        typer.Option(
+            metavar="FILE",
+            help="Draw one run as .svg, .png, .gif or .html, or the tube of many as .svg or .png.",
+        ),
     ] = None,
-    model: Annotated[str, typer.Option(help="Limit surface: exact, ellipsoid, local or quartic.")] = "exact",
-    source: Annotated[str, typer.Option(help="The pusher follows the plan's arcs or its samples.")] = "arcs",
-    position: Annotated[float, typer.Option(help="Noise of the start, each axis [mm].")] = 0.5,
-    angle: Annotated[float, typer.Option(help="Noise of the start [deg].")] = 0.5,
-    friction: Annotated[float, typer.Option(help="Noise of the friction at the fingers [%].")] = 10.0,
+    model: Annotated[
+        str,
+        typer.Option(metavar="MODEL", help="Limit surface of the table: exact, ellipsoid, local or quartic."),
+    ] = "exact",
+    source: Annotated[
+        str, typer.Option(metavar="KIND", help="What the pusher follows: the plan's arcs or its samples.")
+    ] = "arcs",
+    position: Annotated[
+        float, typer.Option(metavar="MM", help="Standard deviation of the start along each axis.")
+    ] = 0.5,
+    angle: Annotated[
+        float, typer.Option(metavar="DEG", help="Standard deviation of the angle at the start.")
+    ] = 0.5,
+    friction: Annotated[
+        float, typer.Option(metavar="PERCENT", help="Standard deviation of the friction at the fingers.")
+    ] = 10.0,
     friction_range: Annotated[
-        str | None, typer.Option(help="Friction at the fingers uniform in LOW,HIGH instead.")
+        str | None,
+        typer.Option(metavar="LOW,HIGH", help="Friction at the fingers, evenly between these, instead."),
     ] = None,
     df: Annotated[
         float | None,
         typer.Option(
-            help="Wishart draws of the limit surface; default 50 for ellipsoid and quartic, 0 for none."
+            metavar="N",
+            help="Degrees of freedom of random limit surfaces (Wishart): 50 by default for ellipsoid and quartic;"
+            " 0 keeps the surface as it is.",
         ),
     ] = None,
-    centre: Annotated[float, typer.Option(help="Noise of the centre of friction, each axis [mm].")] = 0.0,
-    loads: Annotated[float, typer.Option(help="Loads of the feet within ± this [%].")] = 0.0,
+    centre: Annotated[
+        float,
+        typer.Option(metavar="MM", help="Standard deviation of the centre of friction along each axis."),
+    ] = 0.0,
+    loads: Annotated[
+        float, typer.Option(metavar="PERCENT", help="How much the load of each foot may differ, either way.")
+    ] = 0.0,
     on_cluster: Annotated[
         bool, typer.Option("--cluster", help="Spread the runs over a local Dask cluster.")
     ] = False,
     scheduler: Annotated[
-        str | None, typer.Option(help="Spread them over the Dask cluster at this address.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Spread the runs over the Dask cluster at this address."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:

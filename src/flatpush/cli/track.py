@@ -23,29 +23,64 @@ MOST_TOLD, MOST_NOTES = 8, 20
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(help="Plan document (JSON).")],
-    controller: Annotated[str, typer.Option(help="path, dfl or horizon.")] = "path",
-    rate: Annotated[float, typer.Option(help="Of the controller [Hz].")] = 60.0,
-    noise: Annotated[str, typer.Option(help="Of the measured pose, standard deviations MM,DEG.")] = "0.3,0.3",
-    camera: Annotated[float, typer.Option(help="Frames per second [Hz].")] = 30.0,
-    latency: Annotated[float, typer.Option(help="Of a frame [s].")] = 0.1,
-    dropped: Annotated[float, typer.Option(help="Share of frames that never come [%].")] = 0.0,
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
+    controller: Annotated[
+        str, typer.Option(metavar="NAME", help="The controller: path, dfl or horizon.")
+    ] = "path",
+    rate: Annotated[float, typer.Option(metavar="HZ", help="How often the controller decides.")] = 60.0,
+    noise: Annotated[
+        str, typer.Option(metavar="MM,DEG", help="Standard deviations of the measured pose.")
+    ] = "0.3,0.3",
+    camera: Annotated[
+        float, typer.Option(metavar="HZ", help="How many frames the camera gives in a second.")
+    ] = 30.0,
+    latency: Annotated[
+        float, typer.Option(metavar="SECONDS", help="How old a frame is when it arrives.")
+    ] = 0.1,
+    dropped: Annotated[
+        float, typer.Option(metavar="PERCENT", help="Share of the frames that never come.")
+    ] = 0.0,
     friction: Annotated[
-        float | None, typer.Option(help="At the finger in the simulation; default: the scene's.")
+        float | None,
+        typer.Option(metavar="MU", help="Friction at the finger in the simulation; by default the scene's."),
     ] = None,
-    centre: Annotated[str, typer.Option(help="The centre of friction is off by DX,DY [mm].")] = "0,0",
-    start: Annotated[str, typer.Option(help="The start is off by DX,DY,DEG [mm, deg].")] = "0,0,0",
+    centre: Annotated[
+        str, typer.Option(metavar="DX,DY", help="How far off the centre of friction is [mm].")
+    ] = "0,0",
+    start: Annotated[
+        str, typer.Option(metavar="DX,DY,DEG", help="How far off the start is [mm, deg].")
+    ] = "0,0,0",
     timing: Annotated[
-        str, typer.Option(help="even: slow at the junctions of arcs; plan: from rest to rest in each.")
+        str,
+        typer.Option(
+            metavar="LAW",
+            help="even: it slows down where arcs meet; plan: it goes from rest to rest in each.",
+        ),
     ] = "even",
-    frequency: Annotated[float, typer.Option(help="dfl: natural frequency [rad/s].")] = 2.0,
-    damping: Annotated[float, typer.Option(help="dfl: damping ratio.")] = 1.0,
-    learn: Annotated[bool, typer.Option("--learn", help="Learn the steering while pushing.")] = False,
+    frequency: Annotated[
+        float, typer.Option(metavar="RAD/S", help="Natural frequency of the controller dfl.")
+    ] = 2.0,
+    damping: Annotated[
+        float, typer.Option(metavar="RATIO", help="Damping ratio of the controller dfl.")
+    ] = 1.0,
+    learn: Annotated[
+        bool,
+        typer.Option(
+            "--learn",
+            help="Learn how the object turns while it is pushed. It helps where the table is not what the scene says,"
+            " above all a centre of friction that is off (--centre); where all is as told it changes little.",
+        ),
+    ] = False,
     tolerance: Annotated[
-        str | None, typer.Option(help="It arrives within MM,DEG of the goal; default: the scene's.")
+        str | None,
+        typer.Option(
+            metavar="MM,DEG", help="How near the goal it arrives; by default the scene's goal_tolerance."
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
-    figure: Annotated[Path | None, typer.Option(help="Draw the run: .svg or .png.")] = None,
+    seed: Annotated[
+        int, typer.Option(metavar="N", help="Seed of the noise; the same seed gives the same run.")
+    ] = 0,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run as .svg or .png.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Follow PLAN under feedback, in the contact simulator with a simulated camera."""

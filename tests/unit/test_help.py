@@ -1,0 +1,20 @@
+"""The help of every command is read as sentences, and says in words what to put in."""
+
+import pytest
+from typer.main import get_command
+
+from flatpush.cli.app import app
+
+COMMANDS = get_command(app).commands
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_argument_and_option_is_told(name):
+    for parameter in COMMANDS[name].params:
+        if parameter.name == "help":
+            continue
+        told = parameter.help or ""
+        assert told.endswith("."), f"{name} {parameter.name}: {told!r}"
+        assert not told.startswith(("Of ", "In ")), f"{name} {parameter.name}: {told!r}"
+        if not getattr(parameter, "is_flag", False):
+            assert parameter.metavar, f"{name} {parameter.name} takes something that is not named"
