@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 # What breaks the rule of Any below and is still to be mended: it only shrinks.
-MOST_ANY = 32
+MOST_ANY = 18
 
 
 @pytest.mark.parametrize(
@@ -323,7 +323,7 @@ def test_any_does_not_spread():
     """Public signatures without Any; what is left is at the edges of libraries without types. The number only falls."""
     count = 0
     for name, node in functions():
-        if not node.name.startswith("_") and not name.startswith("compiled."):
+        if not node.name.startswith("_") and not name.startswith(("compiled.", "kernel_pipeline.")):
             hints = [a.annotation for a in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]]
             text = " ".join(ast.unparse(hint) for hint in [*hints, node.returns] if hint is not None)
             count += len(re.findall(r"\bAny\b", text))

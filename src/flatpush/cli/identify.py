@@ -157,8 +157,10 @@ class _Found:
             loads = Loads(*places)
             self.judged["loads"] = judge(pairs, loads, seeds=range(seeds), **how)
             self.judged["mean"] = blended("mean", [self.judged["quartic"], self.judged["loads"]], pairs)
-            trust = self.weights["loads"] = choose(pairs, loads, **how)
-            self.loads = fit_loads(pairs.wrenches, pairs.twists, *places[:2], nominal=places[2], trust=trust)
+            self.trust = choose(pairs, loads, **how)
+            self.loads = fit_loads(
+                pairs.wrenches, pairs.twists, *places[:2], nominal=places[2], trust=self.trust
+            )
         better = min(("ellipsoid", "quartic"), key=lambda name: self.judged[name].mean)
         self.model = better if model == "auto" else model
         self.surface = self.fits[self.model]
@@ -177,7 +179,7 @@ class _Found:
             }
         if self.loads is not None:
             models["loads"] |= {
-                "trust": self.weights["loads"],
+                "trust": self.trust,
                 "shares": self.loads.shares.tolist(),
                 "resistance": self.loads.resistance,
             }

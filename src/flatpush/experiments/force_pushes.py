@@ -65,7 +65,7 @@ def recorded(data: Path) -> tuple[Pairs, ...]:
 def judgements(pairs: Pairs, seeds: tuple[int, ...] = SEEDS) -> dict[str, Judgement]:
     """What every model predicts for the pushes of one experiment that it was not fitted to."""
     places = known_places(pairs.name)
-    models = [Smooth("ellipsoid"), Smooth("quartic"), Loads(*places)]
+    models: tuple[Smooth | Loads, ...] = (Smooth("ellipsoid"), Smooth("quartic"), Loads(*places))
     found = {model.name: judge(pairs, model, length=LENGTH, folds=FOLDS, seeds=seeds) for model in models}
     found["mean"] = blended("mean", [found["quartic"], found["loads"]], pairs)
     if not pairs.name.endswith("patch"):

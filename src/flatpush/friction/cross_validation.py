@@ -5,11 +5,12 @@ out are honest: nothing of a pair has touched the fit that predicts it.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Generic, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array
@@ -24,13 +25,16 @@ WEIGHTS = tuple((regularisation, force) for regularisation in (0.001, 0.01) for 
 _RESAMPLES = 2000
 
 
+ChoiceT = TypeVar("ChoiceT")
+
+
 class TwistModel(Protocol):
     """What predicts the twist of a wrench."""
 
-    def twist(self, wrench: Any) -> Array: ...
+    def twist(self, wrench: ArrayLike) -> Array: ...
 
 
-class AbstractModel(ABC):
+class AbstractModel(ABC, Generic[ChoiceT]):
     """A kind of model that can be fitted to pairs, with a few choices of its weights.
 
     Laws: fit depends on the pairs and the choice alone; choices is not empty, its first entry is the default.
@@ -38,44 +42,44 @@ class AbstractModel(ABC):
 
     name: str
     needed: int
-    choices: tuple[Any, ...] = (None,)
+    choices: tuple[ChoiceT, ...]
 
     @abstractmethod
-    def fit(self, pairs: Pairs, choice: Any) -> TwistModel:
+    def fit(self, pairs: Pairs, choice: ChoiceT) -> TwistModel:
         """The fitted model."""
 
 
 @dataclass(frozen=True)
-class Smooth(AbstractModel):
+class Smooth(AbstractModel[tuple[float, float]]):
     """An ellipsoid or a convex quartic; a choice is (λ, β)."""
 
     name: Literal["ellipsoid", "quartic"]
-    choices: tuple[Any, ...] = WEIGHTS
+    choices: tuple[tuple[float, float], ...] = WEIGHTS
 
     @property
     def needed(self) -> int:  # type: ignore[override]
         return 6 if self.name == "ellipsoid" else 15
 
-    def fit(self, pairs: Pairs, choice: Any) -> TwistModel:
+    def fit(self, pairs: Pairs, choice: tuple[float, float]) -> TwistModel:
         fit = fit_ellipsoid if self.name == "ellipsoid" else fit_quartic
         return fit(pairs.wrenches, pairs.twists, regularisation=choice[0], force_weight=choice[1])
 
 
 @dataclass(frozen=True, eq=False)
-class Loads(AbstractModel):
+class Loads(AbstractModel[float]):
     """Coulomb friction at known places with fitted loads (fit_loads); a choice is the trust in the nominal ones."""
 
     places: Array
     parts: Array
     nominal: Array
     name: str = "loads"
-    choices: tuple[Any, ...] = (0.0, 0.5, 1.0)
+    choices: tuple[float, ...] = (0.0, 0.5, 1.0)
 
     @property
     def needed(self) -> int:  # type: ignore[override]
         return self.parts.shape[1] + 1
 
-    def fit(self, pairs: Pairs, choice: Any) -> TwistModel:
+    def fit(self, pairs: Pairs, choice: float) -> TwistModel:
         found = fit_loads(
             pairs.wrenches, pairs.twists, self.places, self.parts, nominal=self.nominal, trust=choice
         )
@@ -83,14 +87,15 @@ class Loads(AbstractModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Known(AbstractModel):
+class Known(AbstractModel[None]):
     """The exact surface of a support that no data were asked about."""
 
     surface: Exact
     name: str = "untrained"
     needed: int = 0
+    choices: tuple[None, ...] = (None,)
 
-    def fit(self, pairs: Pairs, choice: Any) -> TwistModel:
+    def fit(self, pairs: Pairs, choice: None = None) -> TwistModel:
         return self.surface
 
 
@@ -171,7 +176,9 @@ def blended(name: str, judgements: Sequence[Judgement], pairs: Pairs) -> Judgeme
     return _judgement(name, twists, pairs, judgements[0].length)
 
 
-def choose(pairs: Pairs, model: AbstractModel, *, length: float, folds: int = 5, seed: int = 0) -> Any:
+def choose(
+    pairs: Pairs, model: AbstractModel[ChoiceT], *, length: float, folds: int = 5, seed: int = 0
+) -> ChoiceT:
     """The choice of a model's weights with the least mean angle in a cross-validation of these pairs."""
     if len(model.choices) == 1:
         return model.choices[0]
@@ -204,7 +211,7 @@ def parts_of(n: int, folds: int, seed: int) -> list[Array]:
     return np.array_split(np.random.default_rng(seed).permutation(n), folds)
 
 
-def interval(judgements: Sequence[Judgement], statistic: Any) -> tuple[float, float]:
+def interval(judgements: Sequence[Judgement], statistic: Callable[..., Array]) -> tuple[float, float]:
     """95 % confidence interval of a statistic, averaged over experiments [rad].
 
     Percentiles over resampled pairs, each experiment for itself; a pair keeps the angles of all its seeds.

@@ -1,7 +1,7 @@
 """Ellipsoids and convex quartics fitted to pairs of wrench and twist, measured or computed."""
 
 from functools import cache
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from .report import FitReport, twist_angles
 from .sos import coefficients_of, minors, solve, svec, tensor, tensors
 from .support import Support
 from .surface import LimitSurface
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 _LEAST_SCALE = 1e-3  # of a predicted twist, so that the zero gradient explains nothing
 _LEAST_EIGENVALUE = 1e-6  # least eigenvalue asked for: strictly convex, invertible
@@ -282,7 +285,7 @@ class _Rows:
         i, j = np.nonzero(block)
         self.at.append((self.first + i, j, block[i, j]))
 
-    def entries(self, rows: Any, columns: Any, values: Any) -> None:
+    def entries(self, rows: np.ndarray, columns: np.ndarray, values: ArrayLike) -> None:
         self.at.append((self.first + rows, columns, np.broadcast_to(values, rows.shape)))
 
     def end(self, right: Array) -> None:
@@ -290,7 +293,7 @@ class _Rows:
         self.right.append(right)
         self.first += len(right)
 
-    def matrix(self, width: int) -> tuple[Any, Array]:
+    def matrix(self, width: int) -> tuple["csc_matrix", Array]:
         from scipy import sparse
 
         i, j, values = (np.concatenate(part) for part in zip(*self.at, strict=True))

@@ -8,12 +8,15 @@ Gram matrices.
 
 from functools import cache
 from itertools import combinations, permutations, product
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import FlatpushError
 from ..geometry.pose import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 # x⁴ y⁴ z⁴ x³y x³z y³x y³z z³x z³y x²y² x²z² y²z² x²yz y²xz z²xy, as the variables that are multiplied.
 MONOMIALS = ["xxxx", "yyyy", "zzzz", "xxxy", "xxxz", "yyyx", "yyyz", "zzzx", "zzzy", "xxyy", "xxzz", "yyzz"]
@@ -84,7 +87,7 @@ def svec(matrix: Array) -> Array:
     return matrix[columns, rows] * scale
 
 
-def solve(cost: Array, A: Any, b: Array, cones: list[tuple[str, int]], what: str) -> Array:
+def solve(cost: Array, A: "Array | csc_matrix", b: Array, cones: list[tuple[str, int]], what: str) -> Array:
     """The x of least cost·x with b - A x in the cones, by Clarabel; A is an array or a sparse matrix.
 
     Raises:

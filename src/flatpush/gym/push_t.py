@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from shapely import Polygon, affinity
 
 from ..errors import InputError
@@ -109,7 +110,7 @@ class PushTPolicy:
         self._waited = 0
         self.plans = 0
 
-    def act(self, observation: Any) -> Array:
+    def act(self, observation: ArrayLike) -> Array:
         """The command (2,) [px] for an observed state: agent x, y, T x, y [px] and the T's angle [rad].
 
         The agent is taken to be at rest where an episode begins; after each push it is.

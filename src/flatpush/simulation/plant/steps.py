@@ -7,7 +7,6 @@ for any number of contacts and any surface, is simulation.plant.plain.
 """
 
 import math
-from typing import Any
 
 from ...formulas import formula
 from ...geometry.displacement import displaced
@@ -193,8 +192,15 @@ def advance(setting: Setting, move: Move, q: Row, scratch: Scratch) -> int:
 
 @formula
 def _first_touch(
-    setting: Setting, move: Move, s: float, q: Row, V: Any, h: float, mask: int, near: float
-) -> Any:
+    setting: Setting,
+    move: Move,
+    s: float,
+    q: Row,
+    V: tuple[float, float, float],
+    h: float,
+    mask: int,
+    near: float,
+) -> tuple[bool, float]:
     """Whether a contact not in the mask is made in a step h with the twist V from q, and after which part of it.
 
     If nothing is within `near` [m], nothing can be.
@@ -254,7 +260,7 @@ def follow(
     out: Rows,
     seen: Rows,
     scratch: Scratch,
-) -> Any:
+) -> tuple[int, int]:
     """The object under hands that go from pose to pose.
 
     Args:
