@@ -6,16 +6,16 @@ import socket
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController
+from tests.simulated_swing import swing
 
 import flatpush as fp
-from flatpush.execution import DONE, RobotFault, Target, open_robot, run
-from flatpush.execution.course import Course
-from flatpush.execution.run import Played, stream
+from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
 from flatpush.testing import check_robot
 
 pytest.importorskip("abb_robot_client")
@@ -42,18 +42,8 @@ def robot_at(port, **more):
     return EgmRobot("127.0.0.1", port, **{"silence": SILENCE, "connect": SILENCE} | more)
 
 
-def swing(cycles, width=0.02, period=0.004):
-    """There and back, for so many cycles."""
-    t = period * np.arange(cycles - 1.0)
-    shape = 0.5 - 0.5 * np.cos(2 * np.pi * t / t[-1])
-    poses = np.array(HOME) + shape[:, None] * np.array([width, 0.0, 0.0, 0.2])
-    return Course(t, poses, np.zeros(len(t), int), ("swing",), (-1,))
-
-
 def moved(controller, robot, cycles, told=None):
-    course = swing(cycles)
-    course.check(robot.limits)
-    return stream(Played(course, robot.limits.period), robot, robot.clock, told=told)
+    return swing(robot, cycles, told)
 
 
 @pytest.mark.parametrize("cycles", [500, pytest.param(15000, marks=pytest.mark.slow)])
@@ -203,3 +193,55 @@ def test_a_plan_ends_in_the_cell_as_without_the_network(three_feet, tmp_path):
         here = robot.object
     assert np.hypot(*(here - there)[:2]) < 0.0005
     assert abs(here[2] - there[2]) < math.radians(0.3)
+
+
+def test_an_arm_that_is_named_is_a_limit(three_feet):
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(three_feet, (-0.02, -0.04, 0.2), pusher=pusher, pushes=pushes))
+    with Controller("--home", 0.42, 0.0, 0.03, 0.5) as controller:
+        far = open_robot(f"egm://127.0.0.1:{controller.port}?arm=irb120&tool=120", plan, (0.7, 0.0, 0.0, 0.0))
+        with far as robot, pytest.raises(OutOfLimits, match=r"s: it is too far away from the arm"):
+            run(plan, robot)
+        assert controller.asked()["answered"] <= 1  # stop, which says where the tool is
+    assert far.limits.arm.tool == pytest.approx(0.12)
+    for address, rule in (
+        ("egm://h?arm=irb99", "no such arm"),
+        ("egm://h?arm=irb120&tool=-1", "0 mm long or more"),
+    ):
+        with pytest.raises(fp.InputError, match=rule):
+            open_robot(address, plan)
+
+
+SEVEN = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from flatpush.errors import InputError
+from flatpush.execution.egm import EgmRobot
+from tests.simulated_swing import swing
+with EgmRobot("127.0.0.1", int(sys.argv[1]), connect=20, silence=20, robotware=7) as robot:
+    ended = swing(robot, 200)
+assert not [name for name in sys.modules if name.startswith("abb_robot_client")]
+try:
+    EgmRobot(robotware=6)
+except InputError as error:
+    assert "RobotWare 7 was spoken to" in str(error)
+    print(ended.outcome, len(ended.cycles), ended.off)
+"""
+
+
+def test_robotware_7_by_its_own_library():
+    """In a process of its own: both libraries register the same messages."""
+    if find_spec("ABBRobotEGM") is None:
+        pytest.skip("ABBRobotEGM is not installed")
+    with Controller() as controller:
+        words = [sys.executable, "-c", SEVEN, str(controller.port), str(SCRIPT.parents[1])]
+        told = subprocess.run(words, capture_output=True, text=True, env=dict(os.environ), timeout=120)
+        seen = controller.asked()
+    assert told.returncode == 0, told.stderr
+    outcome, cycles, off = told.stdout.split()
+    assert outcome == DONE
+    assert int(cycles) >= 199
+    assert float(off) < 0.0005
+    assert seen["answered"] >= int(cycles)
+    assert seen["stopped"] < 0

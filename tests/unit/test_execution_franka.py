@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController
+from tests.simulated_swing import swing
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
 from flatpush.execution.arms import ARMS
 from flatpush.execution.cell.robot import CellRobot
-from flatpush.execution.course import Course
-from flatpush.execution.run import Played, stream
 from flatpush.execution.simulated import home_of
 from flatpush.testing import check_robot
 
@@ -43,22 +42,12 @@ def robot_at(host, **more):
     return FrankaRobot(host, **{"silence": SILENCE, "connect": SILENCE} | more)
 
 
-def moved(robot, cycles, told=None):
-    """There and back, for so many cycles of 10 ms."""
-    t = 0.01 * np.arange(cycles - 1.0)
-    shape = 0.5 - 0.5 * np.cos(2 * np.pi * t / t[-1])
-    poses = robot.state().pose + shape[:, None] * np.array([0.01, 0.0, 0.0, 0.1])
-    course = Course(t, poses, np.zeros(len(t), int), ("swing",), (-1,))
-    course.check(robot.limits)
-    return stream(Played(course, robot.limits.period), robot, robot.clock, told=told)
-
-
 @pytest.mark.slow
 def test_the_tool_follows_and_rests_and_its_end_is_noticed():
     with Controller() as controller, robot_at(controller.host, silence=2.0) as robot:
         assert np.allclose(robot.state().pose, HOME, atol=2e-5)
         assert np.allclose(controller.asked()["q"], ARM.joints(HOME), atol=1e-4)
-        ended = moved(robot, 60)
+        ended = swing(robot, 60, width=0.01)
         assert ended.outcome == DONE
         poses = np.array([cycle.state.pose for cycle in ended.cycles])
         assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=2e-4)
@@ -75,7 +64,7 @@ def test_the_tool_follows_and_rests_and_its_end_is_noticed():
             if count == 20:
                 controller.process.send_signal(signal.SIGKILL)
 
-        ended = moved(robot, 60, told)
+        ended = swing(robot, 60, told, width=0.01)
         robot.stop()
     assert "lost" in ended.outcome or "silent" in ended.outcome or "ended the motion" in ended.outcome
     assert 20 <= len(ended.cycles) <= 31

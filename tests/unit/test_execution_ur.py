@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController
+from tests.simulated_swing import swing
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
-from flatpush.execution.course import Course
-from flatpush.execution.run import Played, stream
 from flatpush.testing import check_robot
 
 pytest.importorskip("rtde_control")
@@ -40,23 +39,9 @@ def robot_at(host, **more):
     return UrRobot(host, **{"silence": SILENCE, "connect": SILENCE} | more)
 
 
-def swing(cycles, width=0.02, period=0.008):
-    """There and back, for so many cycles."""
-    t = period * np.arange(cycles - 1.0)
-    shape = 0.5 - 0.5 * np.cos(2 * np.pi * t / t[-1])
-    poses = np.array(HOME) + shape[:, None] * np.array([width, 0.0, 0.0, 0.2])
-    return Course(t, poses, np.zeros(len(t), int), ("swing",), (-1,))
-
-
-def moved(robot, cycles, told=None):
-    course = swing(cycles)
-    course.check(robot.limits)
-    return stream(Played(course, robot.limits.period), robot, robot.clock, told=told)
-
-
 def test_every_cycle_has_its_command_and_the_tool_follows():
     with Controller() as controller, robot_at(controller.host) as robot:
-        ended = moved(robot, 200)
+        ended = swing(robot, 200)
         seen = controller.asked()
     assert ended.outcome == DONE
     assert seen["fired"] < 0
@@ -101,7 +86,7 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
                 if count == 100:
                     controller.process.send_signal(how)
 
-            ended = moved(robot, 500, told)
+            ended = swing(robot, 500, told)
             robot.stop()
         assert "silent for 0.5 s" in ended.outcome
         assert 99 <= len(ended.cycles) <= 103
@@ -110,9 +95,9 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
 CLIENT = """
 import sys
 sys.path.insert(0, sys.argv[2])
-from tests.unit.test_execution_ur import moved, robot_at
+from tests.unit.test_execution_ur import robot_at, swing
 with robot_at(sys.argv[1]) as robot:
-    moved(robot, 100000)
+    swing(robot, 100000)
 """
 
 

@@ -1,7 +1,7 @@
 """Robots by their addresses: `sim`, `egm://192.168.125.1:6510`, `mujoco://irb120?seed=3`, or one of your own."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from importlib.metadata import entry_points
 from math import isfinite, radians
@@ -9,6 +9,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from ..errors import InputError
 from ..problem import Plan
+from .arms import arm_named
 from .robot import Limits, Robot
 
 GROUP = "flatpush.robots"
@@ -98,6 +99,21 @@ class Address:
         if "turn" in self.options:
             found = found.tightened(turn_rate=radians(self.numbers("turn", 1, ())[0]))
         return found
+
+    def with_arm(self, given: Limits) -> Limits:
+        """Limits, and those of the joints of the arm that the option arm names, `tool=MM` from flange to fingertips.
+
+        Raises:
+            InputError: for an arm that is not known, or a tool that has no length.
+        """
+        self._used |= {"arm", "tool"}
+        if "arm" not in self.options:
+            return given
+        arm = arm_named(self.options["arm"])
+        (tool,) = self.numbers("tool", 1, (1000 * arm.tool,))
+        if tool < 0:
+            raise InputError("a tool is 0 mm long or more", source=self.text, value=tool)
+        return replace(given, arm=replace(arm.placed(self.base), tool=tool / 1000))
 
     def check_used(self) -> None:
         """Refuses options that this robot does not have.

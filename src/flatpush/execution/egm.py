@@ -1,18 +1,21 @@
 """ABB's Externally Guided Motion over UDP: every 4 ms the controller says where its tool is and is told where to go.
 
-RobotWare 6 speaks it; RAPID's EGMRunPose must be running, with the tool centre point between the fingertips, its z down
-and its x along the push. Each message is answered, and time is the controller's: it goes on only while messages come.
+RobotWare 6 and 7 speak it; RAPID's EGMRunPose must be running, with the tool centre point between the fingertips, its
+z down and its x along the push. Each message is answered, and time is the controller's: it goes on only while messages
+come.
 """
 
 import math
 import socket
+import sys
 import time
+from importlib import import_module
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from ..errors import MissingExtra
+from ..errors import InputError, MissingExtra
 from ..geometry import rotate
 from ..problem import Plan
 from .addresses import Address
@@ -28,6 +31,8 @@ PORT = 6510
 LIMITS = Limits(period=0.004, age=0.1, deviation=0.02)
 CONNECT = 5.0  # patience with a controller that does not send yet [s]
 SILENCE = 0.1  # patience with one that has sent, on the machine's clock [s]
+# RobotWare → library, and the extra that brings it.
+LIBRARIES = {6: ("abb_robot_client.egm", "abb"), 7: ("ABBRobotEGM.egm", "abb7")}
 TURNOVER = 2**32  # of the controller's milliseconds
 
 
@@ -40,9 +45,11 @@ class EgmRobot:
         base: pose of the table in the frame in which the controller gives its poses (x, y, z, yaw) [m, rad].
         limits: what may be asked for.
         connect, silence: patience, in seconds of the machine's clock.
+        robotware: 6 (by abb-robot-client) or 7 (by ABBRobotEGM); one process can speak to one kind only.
 
     Raises:
-        MissingExtra: without abb-robot-client.
+        MissingExtra: without the library.
+        InputError: for another version, or after the other one was used.
     """
 
     real = True
@@ -55,8 +62,9 @@ class EgmRobot:
         limits: Limits = LIMITS,
         connect: float = CONNECT,
         silence: float = SILENCE,
+        robotware: int = 6,
     ) -> None:
-        _load()
+        self._client = _load(robotware)
         self.limits, self.clock, self.time = limits, CycleClock(self, LIMITS.period), 0.0
         self._host, self._port, self._connect, self._silence = host, port, connect, silence
         self._base = base
@@ -71,7 +79,7 @@ class EgmRobot:
             # The library leaves its socket open where it cannot be bound.
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
                 probe.bind(("", self._port))
-            self._egm = _load()(self._port)
+            self._egm = self._client(self._port)
         except OSError as error:
             raise RobotFault(f"UDP port {self._port} cannot be listened on ({error.strerror})") from error
         begun = time.monotonic()
@@ -160,7 +168,7 @@ class EgmRobot:
                 self.time,
                 "the controller sends no pose; EGMRunPose is needed",
             )
-        place, turn = found.cartesian
+        place, turn = found.cartesian[:2]  # RobotWare 7 adds Euler angles
         # Rz(yaw) Rx(π) = (0, cos yaw/2, sin yaw/2, 0)
         yaw = 2 * math.atan2(turn[2], turn[1])
         last = before.pose[3] if before is not None and np.isfinite(before.pose[3]) else 0.0
@@ -192,22 +200,33 @@ class EgmRobot:
         self._egm = None
 
 
-def _load() -> "type[EGM]":
+def _load(robotware: int) -> "type[EGM]":
+    if robotware not in LIBRARIES:
+        raise InputError("robotware is 6 or 7", value=robotware)
+    module, extra = LIBRARIES[robotware]
+    other = LIBRARIES[13 - robotware][0]
+    if other in sys.modules:
+        raise InputError(
+            f"RobotWare {13 - robotware} was spoken to in this process, and both register the same messages",
+            hint="Start another process.",
+        )
     try:
-        from abb_robot_client.egm import EGM
+        found: type[EGM] = import_module(module).EGM
     except ImportError:
         raise MissingExtra(
-            'Externally Guided Motion needs abb-robot-client: pip install "flatpush[abb]"'
+            f'Externally Guided Motion with RobotWare {robotware} needs a library: pip install "flatpush[{extra}]"'
         ) from None
-    return EGM
+    return found
 
 
 def egm(address: Address, plan: Plan) -> EgmRobot:
-    """`egm://HOST:PORT?connect=S&silence=S`"""
+    """`egm://HOST:PORT?connect=S&silence=S&robotware=7&arm=irb120`"""
     limits = address.limits(LIMITS)
     (connect,), (silence,) = (
         address.numbers("connect", 1, (CONNECT,)),
         address.numbers("silence", 1, (SILENCE,)),
     )
+    robotware = round(address.numbers("robotware", 1, (6,))[0])
+    limits = address.with_arm(limits)
     address.check_used()
-    return EgmRobot(address.host, address.port or PORT, address.base, limits, connect, silence)
+    return EgmRobot(address.host, address.port or PORT, address.base, limits, connect, silence, robotware)

@@ -226,7 +226,7 @@ def _load() -> "tuple[type[RTDEControlInterface], type[RTDEReceiveInterface]]":
 
 
 def ur(address: Address, plan: Plan) -> UrRobot:
-    """`ur://HOST?connect=S&silence=S`"""
+    """`ur://HOST?connect=S&silence=S&arm=ur5e`"""
     if not address.host:
         raise InputError("an arm of Universal Robots has an address", value=address.text, hint="ur://HOST")
     limits = address.limits(LIMITS)
@@ -234,5 +234,6 @@ def ur(address: Address, plan: Plan) -> UrRobot:
         address.numbers("connect", 1, (CONNECT,)),
         address.numbers("silence", 1, (SILENCE,)),
     )
+    limits = address.with_arm(limits)
     address.check_used()
     return UrRobot(address.host, address.base, limits, connect, silence)
