@@ -478,6 +478,39 @@ def test_an_outline_is_drawn_by_clicking(page):
     assert page.plan["status"] == "solved"
 
 
+def test_the_pointer_is_a_finger_that_pushes(page):
+    page.press("p")
+    assert page.text("push") == "Push by hand"
+    before = page.scene["start"]
+    body = page.browser.find_element("css selector", "#hand .body").rect
+    x, y = body["x"] - 25, body["y"] + body["height"] / 2
+    page.mouse("mousePressed", x, y)
+    for k in range(1, 16):
+        page.mouse("mouseMoved", x + 8 * k, y)
+        time.sleep(0.05)
+    page.wait("Math.abs(flatpush.hand.object[0] - flatpush.model.scene.start[0]) > 3")
+    assert page.js(
+        "return flatpush.hand.rows.some((row) => row[6] === 'sticks' || row[6].startsWith('slides'))"
+    )
+    page.mouse("mouseReleased", x + 120, y)
+    assert page.scene["start"] == before
+    pushed = page.js("return flatpush.hand.object")
+    page.js(
+        "const s = document.getElementById('save'); s.value = 'run'; s.dispatchEvent(new Event('change'));"
+    )
+    file = page.browser.downloads / "pushed-by-hand.csv"
+    for _ in range(10 * PATIENCE):
+        if file.exists():
+            break
+        time.sleep(0.1)
+    assert file.read_text(encoding="utf-8").startswith("t_s,object_x_mm")
+    page.click("here")
+    page.settle()
+    assert page.scene["start"][:2] == pytest.approx(pushed[:2], abs=0.01)
+    assert page.plan["motion"]["object"][0][:2] == pytest.approx(pushed[:2], abs=0.01)
+    assert not page.browser.find_element("id", "hand").is_displayed()
+
+
 def test_a_finger_on_a_tablet_drags_the_goal(page):
     page.open(TABLET, touch=True)
     before, unit = page.scene["goal"], page.js("return flatpush.table.view.unit")
@@ -504,7 +537,8 @@ def test_nothing_is_cut_off_and_every_control_has_a_name(page, size):
     table = page.browser.find_element("id", "table").rect
     assert table["width"] * table["height"] > 0.35 * size[0] * size[1]
     boxes = page.js(
-        "return [...document.querySelectorAll('header button, header select, footer button, footer select')]"
+        "const all = 'header button:not([hidden]), header select, footer button, footer select';"
+        "return [...document.querySelectorAll(all)]"
         ".map((n) => { const b = n.getBoundingClientRect(); return [n.id, b.left, b.top, b.right, b.bottom]; });"
     )
     for name, left, top, right, bottom in boxes:

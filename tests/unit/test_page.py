@@ -13,6 +13,7 @@ import flatpush as fp
 from flatpush.documents import mapping_of, parse_plan, parse_scene, scene_document, scene_template
 from flatpush.errors import InputError
 from flatpush.page import worker
+from flatpush.page.by_hand import ByHand
 from flatpush.page.files import read_dropped, saved
 from flatpush.page.in_mm import refuse_files, scene_in_mm
 from flatpush.page.live import LivePlanner
@@ -238,3 +239,66 @@ def test_of_the_requests_of_a_client_the_newest_wins(document):
     plans = [answer for client, _, answer in answers if client == 1 and answer["kind"] == "plan"]
     assert plans[0]["status"] == "solved"
     assert [answer["reason"] for client, _, answer in answers if client == 3] == ["there is no plan to save"]
+
+
+@pytest.fixture
+def square():
+    """A step by hand on a square of 40 mm: from where to where, with a friction."""
+    hand = ByHand()
+    document = {
+        "flatpush": "scene/1",
+        "units": {"length": "mm", "angle": "deg"},
+        "object": {"outline": [[-20, -20], [20, -20], [20, 20], [-20, 20]], "friction": 0.5},
+        "pusher": {"tip_radius": 2},
+        "start": [0, 0, 0],
+        "goal": [0, 0, 0],
+    }
+
+    def step(*way, pose=(0, 0, 0), friction=0.5, seconds=0.1):
+        thing = {**document["object"], "friction": friction}
+        value = {
+            "scene": {**document, "object": thing},
+            "object": list(pose),
+            "way": list(way),
+            "seconds": seconds,
+        }
+        return json.loads(json.dumps(hand.step(value), allow_nan=False))
+
+    return step
+
+
+def test_a_finger_at_the_middle_of_a_side_pushes_straight_ahead(square):
+    answer = square(-22, 0, -17, 0)
+    assert (answer["mode"], answer["outcome"]) == ("sticks", "")
+    np.testing.assert_allclose(answer["object"], [5, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(answer["twist"], [50, 0, 0], atol=0.02)
+    np.testing.assert_allclose(answer["force"], [1, 0], atol=1e-4)
+    np.testing.assert_allclose(answer["point"], [-15, 0], atol=1e-3)
+    assert answer["moment"] == pytest.approx(0, abs=0.01)
+
+
+def test_a_finger_off_the_middle_turns_the_object_with_its_force_through_the_contact(square):
+    """The moment about the middle is that of the force at the contact, and the force lies in the friction cone."""
+    answer = square(-22, -10, -21.9, -10)
+    assert answer["twist"][2] > 0
+    arm, force = np.array(answer["point"]) - answer["object"][:2], np.array(answer["force"])
+    assert arm[0] * force[1] - arm[1] * force[0] == pytest.approx(answer["moment"], rel=0.02)
+    normal = [np.cos(answer["object"][2]), np.sin(answer["object"][2])]
+    assert np.degrees(np.arccos(force @ normal)) <= np.degrees(np.arctan(0.5)) + 0.5
+    assert square(-22, 0, -21, 4, friction=0.05)["mode"].startswith("slides")
+
+
+def test_a_finger_beside_or_on_the_object_moves_nothing(square):
+    assert square(-60, 0, -40, 0)["mode"] == "off the object"
+    assert square(-60, 0, -40, 0)["object"] == [0, 0, 0]
+    inside = square(0, 0, 0, 0)
+    assert (inside["outcome"], inside["object"]) == ("starts inside", [0, 0, 0])
+    assert "finger" not in inside
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"seconds": 0}, {"seconds": True}, {"pose": (0, 0)}, {"pose": (0, 0, "x")}, {"friction": -1}]
+)
+def test_a_step_that_is_none_is_refused(square, wrong):
+    with pytest.raises(InputError):
+        square(-22, 0, -21, 0, **wrong)

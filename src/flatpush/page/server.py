@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 3_000_000  # of a message
 RATE, BURST = 150.0, 300.0  # messages a second that a page may send, and at once
+KINDS = "plan", "file", "save", "hand"
 TRIES = 30  # ports
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _IN_USE = (errno.EADDRINUSE, errno.EACCES)
@@ -278,8 +279,8 @@ def checked_message(text: str) -> tuple[int, str, dict[str, object]]:
     number, kind, value = message["number"], message["kind"], message["value"]
     if isinstance(number, bool) or not isinstance(number, int) or not 0 < number < 2**53:
         raise InputError("the number of a message is a whole number from 1", key="number", value=number)
-    if kind not in ("plan", "file", "save"):
-        raise InputError("the kind of a message is plan, file or save", key="kind", value=kind)
+    if kind not in KINDS:
+        raise InputError(f"the kind of a message is one of {', '.join(KINDS)}", key="kind", value=kind)
     if not isinstance(value, dict):
         raise InputError("the value of a message is a mapping", key="value", value=value)
     if not _shallow(value):

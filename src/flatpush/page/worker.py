@@ -48,9 +48,10 @@ class _Worker:
         self._plan: dict[int, Plan] = {}  # the last that was solved
         self._going_on: dict[int, _Job] = {}
         self._waiting = set[int]()  # clients that have no answer yet
+        from .by_hand import ByHand
         from .live import LivePlanner
 
-        self._planner = LivePlanner()
+        self._planner, self._hand = LivePlanner(), ByHand()
 
     def run(self) -> None:
         """Until the other end is closed, which raises EOFError or OSError."""
@@ -88,7 +89,10 @@ class _Worker:
             from .files import read_dropped, saved
 
             try:
-                answer = read_dropped(value) if kind == "file" else saved(value, self._plan.get(client))
+                if kind == "hand":
+                    answer = self._hand.step(value)
+                else:
+                    answer = read_dropped(value) if kind == "file" else saved(value, self._plan.get(client))
             except FlatpushError as error:
                 answer = {"kind": "error", "reason": str(error)}
             self._requests.send((client, number, answer))

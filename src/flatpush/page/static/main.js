@@ -1,7 +1,8 @@
 /* The page: a scene that is moved by hand, and the plan that follows it. */
 
 import { Connection } from "./connection.js";
-import { centroid, corners, find, html, isCircle, near, place, radians, rounded, turned } from "./geometry.js";
+import { centroid, corners, find, html, isCircle, near, place, radians, rounded, turned, within } from "./geometry.js";
+import { Hand } from "./hand.js";
 import { keep, linked, packed } from "./link.js";
 import { Model } from "./model.js";
 import { Panel } from "./panel.js";
@@ -10,7 +11,8 @@ import { Table, newOutline } from "./table.js";
 
 const model = new Model(), table = new Table(model), player = new Player(model), panel = new Panel(model, player);
 const connection = new Connection(new URLSearchParams(location.search).get("token") || "");
-const state = { latencies: table.latencies, model, table, player, connection, busy: false, answered: 0 };
+const hand = table.hand = new Hand(model, table, connection);
+const state = { latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };
 window.flatpush = state;   /* for whoever measures and tests */
 
 /* ---- messages of the server ---- */
@@ -78,12 +80,14 @@ connection.addEventListener("file", (event) => {
   banner(`${answer.name}: ` + (answer.scene ? "opened" : `${answer.outline.length} corners` + (answer.left_out ? `, ${answer.left_out} other parts left out` : "")), true, 6);
 });
 
-connection.addEventListener("saved", (event) => {
-  const { name, text } = event.detail, address = URL.createObjectURL(new Blob([text]));
+connection.addEventListener("saved", (event) => download(event.detail.name, event.detail.text));
+
+function download(name, text) {
+  const address = URL.createObjectURL(new Blob([text]));
   const link = html("a", { href: address, download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(address), 10000);
-});
+}
 
 /* ---- the scene has changed ---- */
 
@@ -98,6 +102,9 @@ model.addEventListener("selected", () => { table.drawPlan(); show(); });
 function show() {
   find("remove").disabled = !model.selected.startsWith("obstacle:");
   find("draw").classList.toggle("on", Boolean(table.sketch));
+  find("push").classList.toggle("on", hand.on);
+  find("push").setAttribute("aria-pressed", String(hand.on));
+  find("here").hidden = !hand.on;
 }
 
 /* ---- what one can do ---- */
@@ -179,6 +186,10 @@ function pixel(name) {
 }
 
 async function save(what) {
+  if (what === "run") {
+    if (hand.rows.length) download("pushed-by-hand.csv", hand.csv()); else banner("Nothing has been pushed by hand yet.", true, 5);
+    return;
+  }
   if (what !== "link") { connection.send("save", { what, scene: model.scene }); return; }
   const link = location.href.split("#")[0] + "#s=" + await packed(model.scene);
   try {
@@ -190,9 +201,22 @@ async function save(what) {
   }
 }
 
+function push(on = !hand.on) {
+  if (table.sketch) table.cancel();
+  player.play(false);
+  hand.turn(on);
+  show();
+}
+
 const clicks = {
+  push: () => push(),
+  here: () => {
+    const [x, y, angle] = hand.pose();
+    model.change((scene) => { scene.start = [rounded(x, 2), rounded(y, 2), within(rounded(angle, 2))]; });
+    push(false);
+  },
   undo: () => model.undo(), redo: () => model.redo(), add: addObstacle, remove,
-  draw: () => { if (table.sketch) table.cancel(); else table.begin(); show(); },
+  draw: () => { hand.turn(false); if (table.sketch) table.cancel(); else table.begin(); show(); },
   open: () => find("file").click(), help: () => find("keys").showModal(),
   nearer: () => table.zoom(0.8), further: () => table.zoom(1.25), fit: () => { table.touched = false; table.fit(); },
 };
@@ -204,7 +228,7 @@ find("save").addEventListener("change", (event) => { save(event.target.value); e
 
 const KEYS = [
   ["Space", "play or pause"], ["← → ↑ ↓", "nudge what is selected by 1 mm, with Shift 10 mm; else step in time"], ["R", "turn what is selected by 15°, with Shift back; with Alt 1°"],
-  [", .", "previous or next segment"], ["Home End", "begin or end of the plan"], ["A", "add an obstacle"], ["Delete", "remove the selected obstacle"], ["D", "draw the outline of the object; Enter closes it, Escape gives up"],
+  [", .", "previous or next segment"], ["Home End", "begin or end of the plan"], ["A", "add an obstacle"], ["Delete", "remove the selected obstacle"], ["P", "push by hand: the pointer is a finger; Escape ends it"], ["D", "draw the outline of the object; Enter closes it, Escape gives up"],
   ["Tab", "select the next thing on the table"], ["F", "show everything"], ["+ −", "nearer, further away"], ["Ctrl Z", "undo"], ["Ctrl Shift Z", "redo"], ["?", "these keys"],
 ];
 find("keylist").append(...KEYS.flatMap(([key, what]) => [html("dt", {}, ...key.split(" ").flatMap((k) => [html("kbd", {}, k), " "])), html("dd", {}, what)]));
@@ -213,8 +237,8 @@ const step = () => Math.max(player.duration / 100, 0.02);
 const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const keys = {
   " ": () => player.play(!player.playing), Home: () => player.show(0), End: () => player.show(player.duration), ",": () => player.jump(false), ".": () => player.jump(true),
-  a: addObstacle, d: clicks.draw, f: clicks.fit, "+": clicks.nearer, "=": clicks.nearer, "-": clicks.further, "?": clicks.help, Delete: remove, Backspace: remove,
-  Enter: () => { if (table.sketch) { table.finish(); show(); } }, Escape: () => { if (table.sketch) { table.cancel(); show(); } else model.select(""); },
+  a: addObstacle, p: clicks.push, d: clicks.draw, f: clicks.fit, "+": clicks.nearer, "=": clicks.nearer, "-": clicks.further, "?": clicks.help, Delete: remove, Backspace: remove,
+  Enter: () => { if (table.sketch) { table.finish(); show(); } }, Escape: () => { if (table.sketch) { table.cancel(); show(); } else if (hand.on) push(false); else model.select(""); },
 };
 
 document.addEventListener("keydown", (event) => {

@@ -213,9 +213,10 @@ export class Table {
     if (event.button > 0) return;
     const screen = [event.clientX, event.clientY];
     this.pointers.set(event.pointerId, screen);
-    if (this.pointers.size === 2) { this.drag = this.pinch(); return; }
+    if (this.pointers.size === 2) { this.hand.up(); this.drag = this.pinch(); return; }
     if (this.pointers.size > 2) return;
     if (this.sketch) { this.sketchAt(this.at(event)); return; }
+    if (this.hand.on) { this.node.setPointerCapture(event.pointerId); this.hand.down(this.at(event)); return; }
     const part = event.target.closest("[data-part]"), item = event.target.closest("[data-item]");
     const from = this.at(event), { scene } = this.model;
     this.node.setPointerCapture(event.pointerId);
@@ -237,6 +238,7 @@ export class Table {
   move(event) {
     if (this.pointers.has(event.pointerId)) this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
     if (this.sketch) { this.sketch.hover = this.at(event); this.drawScene(); return; }
+    if (this.hand.on && !this.drag) { this.hand.move(this.at(event)); return; }
     const drag = this.drag;
     if (!drag) return;
     if (drag.kind === "pinch") {
@@ -291,6 +293,7 @@ export class Table {
 
   up(event) {
     this.pointers.delete(event.pointerId);
+    if (this.hand.on) this.hand.up();
     document.body.classList.remove("dragging");
     const drag = this.drag;
     this.drag = null;
