@@ -1,0 +1,136 @@
+"""How quickly the live page answers, in headless Chromium: python benchmarks/page.py [MOVES], a minute.
+
+From a pointer's move to the new path on the screen, while start and goal are dragged: among nothing and among ten
+obstacles; and from the start of `flatpush view` to the first plan on the screen, with compiled kernels.
+"""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from selenium import webdriver
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "triangle.yaml"
+WAIT = 60  # for anything [s]
+
+
+def served(scene: Path) -> tuple[subprocess.Popen[str], str, float]:
+    """The server, its link, and when it was started [s]."""
+    began = time.perf_counter()
+    command = [
+        sys.executable,
+        "-c",
+        "from flatpush.cli import main; main()",
+        "view",
+        "--no-browser",
+        "--port",
+        "0",
+    ]
+    server = subprocess.Popen([*command, str(scene)], stderr=subprocess.PIPE, text=True)
+    assert server.stderr is not None
+    return server, server.stderr.readline().split()[-1], began
+
+
+def crowded(folder: Path) -> Path:
+    """The triangle among ten obstacles that leave a way."""
+    import yaml
+
+    from flatpush.documents import load_scene
+    from flatpush.page.in_mm import scene_in_mm
+
+    scene = scene_in_mm(load_scene(EXAMPLE))
+    places = [(-140 + 40 * k, 135) for k in range(5)] + [(-120 + 40 * k, -75) for k in range(5)]
+    scene["workspace"] = {
+        "obstacles": [[[x, y], [x + 20, y], [x + 20, y + 20], [x, y + 20]] for x, y in places]
+    }
+    path = folder / "crowded.yaml"
+    path.write_text(yaml.safe_dump(scene), encoding="utf-8")
+    return path
+
+
+def wait(browser: webdriver.Chrome, condition: str) -> None:
+    until = time.monotonic() + WAIT
+    while not browser.execute_script(f"return Boolean({condition})"):
+        if time.monotonic() > until:
+            sys.exit(f"it never came: {condition}")
+        time.sleep(0.002)
+
+
+def dragged(browser: webdriver.Chrome, thing: str, moves: int) -> list[float]:
+    """Latencies [ms] of a drag at 60 moves a second."""
+    x, y = browser.execute_script(
+        "const b = document.querySelector(arguments[0]).getBoundingClientRect();"
+        "return [b.x + b.width / 2, b.y + b.height / 2];",
+        f"#{thing} .body",
+    )
+
+    def mouse(kind: str, k: int) -> None:
+        angle = 2 * np.pi * k / max(moves, 1)
+        event = {
+            "type": kind,
+            "x": x + 40 * np.sin(angle),
+            "y": y + 20 * np.sin(2 * angle),
+            "button": "left",
+            "buttons": 1,
+        }
+        browser.execute_cdp_cmd("Input.dispatchMouseEvent", {**event, "clickCount": 1})
+
+    browser.execute_script("flatpush.latencies.length = 0")
+    mouse("mousePressed", 0)
+    began = time.perf_counter()
+    for k in range(1, moves + 1):
+        time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
+        mouse("mouseMoved", k)
+    mouse("mouseReleased", moves)
+    wait(browser, "!flatpush.busy")
+    return [float(v) for v in browser.execute_script("return flatpush.latencies")]
+
+
+def main() -> None:
+    moves = int(sys.argv[1]) if len(sys.argv) > 1 else 240
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    for flag in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--window-size=1280,720",
+    ):
+        options.add_argument(flag)
+    browser = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
+    found: dict[str, object] = {"moves": moves}
+    size = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            for name, scene in (("free", EXAMPLE), ("ten obstacles", crowded(Path(folder)))):
+                server, link, began = served(scene)
+                browser.get(link)
+                wait(browser, "window.flatpush && flatpush.answered")
+                found[f"{name}: first plan after the start of the server [s]"] = round(
+                    time.perf_counter() - began, 2
+                )
+                wait(browser, "!flatpush.busy")
+                for thing in ("start", "goal"):
+                    times = dragged(browser, thing, moves)
+                    found[f"{name}: {thing} dragged"] = {
+                        "paths": len(times),
+                        "median [ms]": round(float(np.median(times)), 1),
+                        "95 % [ms]": round(float(np.percentile(times, 95)), 1),
+                    }
+                server.send_signal(signal.SIGINT)
+                server.wait(WAIT)
+    finally:
+        browser.quit()
+    print(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
