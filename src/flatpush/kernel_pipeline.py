@@ -5,6 +5,7 @@ each kernel that it is linked into. That, and looking up anew for each `a + b` w
 a quarter of what compiling cost.
 """
 
+import importlib
 from typing import Any
 
 from numba.core import types
@@ -13,6 +14,7 @@ from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.functions import BaseFunction
+from numba.np import linalg
 
 
 class Within(Compiler):
@@ -70,4 +72,17 @@ def _remember_operators() -> None:
     BaseFunction.get_call_type = get_call_type  # type: ignore[method-assign]
 
 
+def _ask_for_blas_when_needed() -> None:
+    """Imports numba's functions of arrays without scipy.linalg, a tenth of a warm start.
+
+    While it is imported numba only wants to know that scipy is there; functions that use BLAS ask again.
+    """
+    ask, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = ask
+
+
 _remember_operators()
+_ask_for_blas_when_needed()

@@ -11,11 +11,13 @@ from ..errors import InputError
 from ..friction.ellipsoid import Ellipsoid
 from ..friction.exact import Exact
 from ..friction.surface import LimitSurface, WrenchSet
-from ..geometry.pose import Array
+from ..geometry.pose import Array, cross
 from .point_contact import PointContact
 
 # Relative slack of the closed cone, above rounding and below any physical meaning.
 CLOSED = 1e-9
+# Twice the area, over the extent squared, of a triangle whose middle corner rounding alone has put off an edge.
+_ON_EDGE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,19 +97,17 @@ class WrenchCone:
         Raises:
             InputError: if the cone holds a wrench and its opposite (fingers that squeeze), or lies in a plane.
         """
-        from scipy.spatial import ConvexHull, QhullError
-
         axis = self.axis
         x = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
         x = x / np.linalg.norm(x)
         flat = self.rays @ np.stack([x, np.cross(axis, x)], axis=1) / (self.rays @ axis)[:, None]
-        try:
-            return np.asarray(ConvexHull(flat).vertices)
-        except QhullError as error:
+        edges = _hull(flat)
+        if len(edges) < 3:
             raise InputError(
                 "the forces of the fingers lie in one plane: without friction, or at one place, two fingers have no"
                 " region of motions"
-            ) from error
+            )
+        return edges
 
     @property
     def axis(self) -> Array:
@@ -123,6 +123,27 @@ class WrenchCone:
                 "the two fingers can squeeze the object between them, so that no push is determined there"
             )
         return axis / size
+
+
+def _hull(points: Array) -> Array:
+    """Numbers of the corners of the convex hull of points (k, 2), counter-clockwise; of points on a line its two ends.
+
+    By monotone chains. For the few rays of a cone scipy's would take half a second to be imported.
+    """
+    flat = _ON_EDGE * float(np.max(np.ptp(points, axis=0))) ** 2
+    order = np.lexsort(points.T[::-1]).tolist()
+    chains: list[list[int]] = []
+    for way in (order, order[::-1]):
+        chain: list[int] = []
+        for i in way:
+            while len(chain) > 1:
+                last = points[chain[-1]]
+                if cross(last - points[chain[-2]], points[i] - last) > flat:
+                    break
+                chain.pop()
+            chain.append(i)
+        chains.append(chain[:-1])
+    return np.array(chains[0] + chains[1])
 
 
 def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:

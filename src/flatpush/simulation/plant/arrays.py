@@ -222,9 +222,9 @@ def blank(dtype: np.dtype, count: int) -> list[Row]:
 
 def plain_rows(rows: Array) -> Rows:
     """A record array as NamedTuples of Python's numbers."""
-    Plain = _PLAIN.setdefault(
-        rows.dtype, NamedTuple("Plain", [(name, float) for name in rows.dtype.names or ()])
-    )
+    Plain = _PLAIN.get(rows.dtype)
+    if Plain is None:
+        Plain = _PLAIN[rows.dtype] = namedtuple("Plain", rows.dtype.names or ())
     return [Plain(*row) for row in rows.tolist()]
 
 
