@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from .arrays import (
     POSE,
     SCRATCH,
     SEEN,
+    OutlineArrays,
+    Rows,
     RunArrays,
     Setting,
     SurfaceArrays,
@@ -120,6 +123,12 @@ class Runner:
             self._own = run_arrays([self._surface], cof[None], np.array([friction]))
         self._step: Callable[..., None] | None = None  # the kernel, with what it is given of the plant itself
 
+    @cached_property
+    def _rows(self) -> tuple[OutlineArrays, Rows, SurfaceArrays | None]:
+        """Outline, fingertips and surface for the interpreter."""
+        own = None if self._surface is None else interpreted(self._surface)
+        return interpreted(self._outline), plain_rows(self._things[2]), own
+
     def step(self, q: Array, way: Array) -> Done:
         """One run from X_WO q (3,) under hands that go straight between two poses (2, h, 3), the first known.
 
@@ -213,8 +222,8 @@ class Runner:
     def _interpreted(self, task: Task, surfaces: Sequence[SurfaceArrays], done: Done) -> None:
         room, count = scratch(), task.hands.shape[2]
         ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in task.hands]
-        plain = [interpreted(arrays) for arrays in surfaces]
-        outline, fingers = interpreted(self._outline), plain_rows(self._things[2])
+        outline, fingers, own = self._rows
+        plain = [own if arrays is self._surface else interpreted(arrays) for arrays in surfaces]
         out, seen = blank(POSE, task.rows), blank(SEEN, task.rows * len(fingers))
         start = blank(POSE, 1)[0]
         for r, pose in enumerate(task.starts.tolist()):
