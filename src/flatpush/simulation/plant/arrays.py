@@ -222,11 +222,10 @@ def blank(dtype: np.dtype, count: int) -> list[Row]:
 
 def plain_rows(rows: Array) -> Rows:
     """A record array as NamedTuples of Python's numbers."""
-    Plain = _PLAIN.get(rows.dtype)
-    if Plain is None:
-        Plain = NamedTuple("Plain", [(name, float) for name in rows.dtype.names or ()])  # takes a millisecond
-        _PLAIN[rows.dtype] = Plain
-    return [Plain(*row) for row in rows.tolist()]
+    if rows.dtype not in _PLAIN:  # making a class takes a millisecond
+        columns: Any = [(name, float) for name in rows.dtype.names or ()]
+        _PLAIN[rows.dtype] = NamedTuple("Plain", columns)  # type: ignore[misc]
+    return [_PLAIN[rows.dtype](*row) for row in rows.tolist()]
 
 
 _PLAIN: dict[np.dtype, Any] = {}

@@ -223,7 +223,7 @@ class Runner:
         room, count = scratch(), task.hands.shape[2]
         ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in task.hands]
         outline, fingers, own = self._rows
-        plain = [own if arrays is self._surface else interpreted(arrays) for arrays in surfaces]
+        plain = [own if own and arrays is self._surface else interpreted(arrays) for arrays in surfaces]
         out, seen = blank(POSE, task.rows), blank(SEEN, task.rows * len(fingers))
         start = blank(POSE, 1)[0]
         for r, pose in enumerate(task.starts.tolist()):
