@@ -224,7 +224,7 @@ def plain_rows(rows: Array) -> Rows:
     """A record array as NamedTuples of Python's numbers."""
     if rows.dtype not in _PLAIN:  # making a class takes a millisecond
         columns: Any = [(name, float) for name in rows.dtype.names or ()]
-        _PLAIN[rows.dtype] = NamedTuple("Plain", columns)  # type: ignore[misc]
+        _PLAIN[rows.dtype] = NamedTuple("Plain", columns)
     return [_PLAIN[rows.dtype](*row) for row in rows.tolist()]
 
 
