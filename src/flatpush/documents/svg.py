@@ -12,13 +12,13 @@ from ..errors import InputError
 from ..geometry.pose import Array
 from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent
 from .reading import read_bytes
-from .svg_path import EllipticArc, Segment, Straight, subpaths, traced
-from .svg_style import GEOMETRY, Element, Rule, Unsupported, sheet_rules, style_of
+from .svg_path import Segment, traced
+from .svg_shapes import NUMBERS, SHAPES, Sizes
+from .svg_style import Element, Rule, Unsupported, sheet_rules, style_of
 from .svg_units import (
     LENGTH,
     NO_TURN,
     PX,
-    UNITS,
     fitted,
     joined,
     number,
@@ -29,10 +29,8 @@ from .svg_units import (
 )
 from .svg_xml import parsed
 
-_NUMBERS = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _URL = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
 _CONTAINERS = ("g", "a", "svg", "switch")
-_SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 # What is visible and is no line of the object, with the word for it.
 _ASIDE = {"text": "text", "flowRoot": "text", "image": "a picture"}
 _MOVING = ("animate", "animateTransform", "animateMotion", "set")
@@ -109,8 +107,7 @@ class _Reader:
         self.ids: dict[str, Element] = {}
         self.rules: list[Rule] = []
         self.count = self.reused = 0
-        self.real: str = ""  # places of shapes with lengths in real units, and of those without
-        self.bare: str = ""
+        self.sizes = Sizes()
 
     def read(self) -> Drawing:
         waiting = [self.root]
@@ -129,10 +126,11 @@ class _Reader:
         sides = [number(self.root.attributes.get(key, "")) for key in ("width", "height")]
         viewport = (box[2], box[3]) if box is not None else (sides[0], sides[1])
         self.visit(self.root, _State(NO_TURN, {}, viewport), page=True)
-        if self.real and self.drawing.unit is None:
-            if self.bare:
+        real, bare = self.sizes.real, self.sizes.bare
+        if real and self.drawing.unit is None:
+            if bare:
                 raise InputError(
-                    f"{self.real} has lengths in real units, {self.bare} has none, and the page has no real size",
+                    f"{real} has lengths in real units, {bare} has none, and the page has no real size",
                     hint="Give the page width and height in mm and a viewBox.",
                 )
             self.drawing.unit = PX
@@ -147,7 +145,7 @@ class _Reader:
                 f" and {_MOST_NESTED} levels of reuse"
             )
         tag = element.tag
-        if tag not in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use", "foreignObject"):
+        if tag not in (*_CONTAINERS, *SHAPES, *_ASIDE, "use", "foreignObject"):
             return  # definitions, metadata and what other programs put there
         try:
             style = style_of(element, self.rules, state.style)
@@ -159,7 +157,7 @@ class _Reader:
             self.left_out(element, state.hidden)
             return
         try:
-            if tag in _SHAPES:
+            if tag in SHAPES:
                 self.shape(element, state)
             elif tag in _ASIDE:
                 self.left_out(element, _ASIDE[tag])
@@ -224,14 +222,14 @@ class _Reader:
         if element.attributes.get("clipPathUnits", "userSpaceOnUse") != "userSpaceOnUse":
             return None
         (child,) = element.children
-        if child.tag not in _SHAPES or any(
+        if child.tag not in SHAPES or any(
             k in e.attributes for k in ("clip-path",) for e in (element, child)
         ):
             return None
         matrix = joined(state.matrix, transform(element, style_of(element, self.rules, {})))
         style = style_of(child, self.rules, {})
         matrix = joined(matrix, transform(child, style))
-        parts = self.segments(child, replace(state, matrix=matrix, style=style))
+        parts = self.sizes.segments(child, replace(state, matrix=matrix, style=style))
         if len(parts) != 1:
             return None
         points = traced([s.moved(matrix) for s in parts[0]])(np.inf)
@@ -247,7 +245,7 @@ class _Reader:
         if id(target) in state.used:
             self.unreadable(element, state, "it shows itself")
             return
-        x, y = (self.length(element, key, state, axis) for axis, key in enumerate(("x", "y")))
+        x, y = (self.sizes.length(element, key, state, axis) for axis, key in enumerate(("x", "y")))
         matrix = joined(state.matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
         state = replace(state, matrix=matrix, used=(*state.used, id(target)))
         if target.tag not in ("symbol", "svg"):
@@ -270,7 +268,7 @@ class _Reader:
     def switch(self, element: Element, state: _State) -> None:
         """Draws the first part whose conditions hold."""
         for child in element.children:
-            if child.tag not in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use", "foreignObject"):
+            if child.tag not in (*_CONTAINERS, *SHAPES, *_ASIDE, "use", "foreignObject"):
                 continue
             if child.attributes.get("systemLanguage", "").strip():
                 self.unreadable(child, state, "whether it is shown depends on the language of the reader")
@@ -287,11 +285,11 @@ class _Reader:
         placed = Element(element.tag, {**whole, **given}, element.line)
         x, y = (0.0, 0.0)
         if element.tag == "svg":
-            x, y = (self.length(placed, key, state, axis) for axis, key in enumerate(("x", "y")))
+            x, y = (self.sizes.length(placed, key, state, axis) for axis, key in enumerate(("x", "y")))
         box = view_box(placed)
         try:
             width, height = (
-                self.length(placed, key, state, axis) for axis, key in enumerate(("width", "height"))
+                self.sizes.length(placed, key, state, axis) for axis, key in enumerate(("width", "height"))
             )
         except ValueError:
             if box is not None:
@@ -325,7 +323,7 @@ class _Reader:
         place = element.place + (f" on layer {state.layer!r}" if state.layer else "")
         if filled and not stroked and self.is_paper(element, state):
             aside = "a white rectangle as large as the page"
-        dashes = [float(x) for x in _NUMBERS.findall(style.get("stroke-dasharray", ""))]
+        dashes = [float(x) for x in NUMBERS.findall(style.get("stroke-dasharray", ""))]
         if stroked and not filled and any(dashes):
             aside = f"a dashed line ({style['stroke-dasharray']})"
         marker = next((style[k] for k in ("marker-start", "marker-mid", "marker-end") if k in style), "none")
@@ -335,7 +333,7 @@ class _Reader:
             and element.tag in ("path", "line", "polyline", "polygon")
         ):
             refusal = refusal or f"it has markers ({marker})"
-        for segments in self.segments(element, state):
+        for segments in self.sizes.segments(element, state):
             moved: list[Segment] = [s.moved(upright(state.matrix)) for s in segments]
             points = traced(moved)
             cut = refusal
@@ -358,100 +356,15 @@ class _Reader:
         if box is None:
             box = np.array([0.0, 0.0, *state.viewport])
         points = np.concatenate(
-            [s.moved(state.matrix).points(np.inf) for s in self.segments(element, state)[0]]
+            [s.moved(state.matrix).points(np.inf) for s in self.sizes.segments(element, state)[0]]
         )
         low, high = points.min(axis=0), points.max(axis=0)
         slack = 1e-3 * max(box[2], box[3])
         return bool(np.all(low <= box[:2] + slack) and np.all(high >= box[:2] + box[2:] - slack))
 
-    def segments(self, element: Element, state: _State) -> list[list[Segment]]:
-        """The subpaths of a basic shape or a path, in its own frame."""
-        tag = element.tag
-        if tag == "path":
-            self.note(element, bare=True)
-            data = state.style.get("d", element.attributes.get("d", ""))
-            if match := re.fullmatch(r"path\(\s*['\"](.*)['\"]\s*\)", data, re.S):
-                data = match[1]
-            return subpaths("" if data.strip().lower() == "none" else data)
-        if tag in ("polyline", "polygon"):
-            text = element.attributes.get("points", "")
-            if _NUMBERS.sub("", text).strip(" \t\r\n\f,"):
-                raise ValueError(f"its points are no numbers ({text[:40]!r})")
-            numbers = [float(x) for x in _NUMBERS.findall(text)]
-            if len(numbers) % 2 or not np.all(np.isfinite(numbers)):
-                raise ValueError("its points are not pairs of finite numbers")
-            self.note(element, bare=True)
-            corners = np.array(numbers).reshape(-1, 2)
-            if tag == "polygon" and len(corners):
-                corners = np.concatenate([corners, corners[:1]])
-            return [[Straight(corners)]] if len(corners) > 1 else []
-        if tag == "line":
-            x1, y1, x2, y2 = (
-                self.length(element, k, state, n % 2) for n, k in enumerate(("x1", "y1", "x2", "y2"))
-            )
-            return [[Straight(np.array([(x1, y1), (x2, y2)]))]]
-        if tag == "rect":
-            x, y, w, h = (
-                self.length(element, k, state, n % 2) for n, k in enumerate(("x", "y", "width", "height"))
-            )
-            rx, ry = (self.radius(element, k, state, n) for n, k in enumerate(("rx", "ry")))
-            if w < 0 or h < 0:
-                raise ValueError("its width and height are not negative")
-            return _rectangle(x, y, w, h, rx, ry) if w and h else []
-        cx, cy = (self.length(element, k, state, n) for n, k in enumerate(("cx", "cy")))
-        if tag == "circle":
-            rx = ry = self.length(element, "r", state, 2)
-        else:
-            given = [self.radius(element, k, state, n) for n, k in enumerate(("rx", "ry"))]
-            rx = given[0] if given[0] is not None else given[1] or 0.0
-            ry = given[1] if given[1] is not None else rx
-        if rx < 0 or ry < 0:
-            raise ValueError("its radius is not negative")
-        if not (rx and ry):
-            return []
-        return [[EllipticArc(np.array([cx, cy]), np.diag([rx, ry]), 0.0, 2 * np.pi)]]
-
-    def radius(self, element: Element, key: str, state: _State, axis: int) -> float | None:
-        """A radius that may be left out or auto; None then, and for a negative one, as browsers read it."""
-        text = state.style.get(key, element.attributes.get(key, "auto"))
-        if text.strip().lower() in ("", "auto"):
-            return None
-        value = self.length(element, key, state, axis)
-        return value if value >= 0 else None
-
-    def length(self, element: Element, key: str, state: _State, axis: int) -> float:
-        """A length in the units of the drawing; 0 if left out. axis: 0 across, 1 down, 2 of both for radii."""
-        text = state.style.get(key, "") if key in GEOMETRY and element.tag in _SHAPES else ""
-        text = text or element.attributes.get(key, "0")
-        match = LENGTH.fullmatch(text)
-        if match is None:
-            if text.strip().lower() == "auto" and key in ("width", "height"):
-                return self.length(Element(element.tag, {key: "100%"}, element.line), key, state, axis)
-            raise ValueError(f"its {key} is no length ({text!r})")
-        value, unit = float(match[1]), match[2].lower()
-        if not np.isfinite(value):
-            raise ValueError(f"its {key} is not finite ({text!r})")
-        if unit == "%":
-            w, h = state.viewport
-            whole = (w, h, np.hypot(w, h) / np.sqrt(2))[axis]
-            if not np.isfinite(whole):
-                raise ValueError(f"its {key} is a part of a page of unknown size ({text!r})")
-            return value / 100 * float(whole)
-        if unit not in ("", "px", *UNITS):
-            raise ValueError(f"the unit of its {key} is not known ({text!r})")
-        if value and element.tag in _SHAPES:
-            self.note(element, bare=unit in ("", "px"))
-        return value * (UNITS[unit] / PX if unit in UNITS else 1.0)
-
-    def note(self, element: Element, bare: bool) -> None:
-        if bare:
-            self.bare = self.bare or element.place
-        else:
-            self.real = self.real or element.place
-
     def left_out(self, element: Element, reason: str) -> None:
-        if any(child.tag in (*_CONTAINERS, *_SHAPES, *_ASIDE, "use") for child in element.children) or (
-            element.tag in (*_SHAPES, *_ASIDE, "use", "image")
+        if any(child.tag in (*_CONTAINERS, *SHAPES, *_ASIDE, "use") for child in element.children) or (
+            element.tag in (*SHAPES, *_ASIDE, "use", "image")
         ):
             self.drawing.left_out.append(LeftOut(element.place, reason))
         for child in element.children:  # so that what is hidden is known by name
@@ -461,26 +374,6 @@ class _Reader:
     def unreadable(self, element: Element, state: _State, reason: str) -> None:
         names = (element.attributes.get(key, "") for key in ("id", "inkscape:label"))
         self.drawing.unreadable.append(Unreadable(element.place, reason, (*state.names, *names)))
-
-
-def _rectangle(
-    x: float, y: float, w: float, h: float, rx: float | None, ry: float | None
-) -> list[list[Segment]]:
-    """A rectangle with round corners; a radius that is left out is the other, none exceeds half the side."""
-    rx, ry = (ry or 0.0) if rx is None else rx, (rx or 0.0) if ry is None else ry
-    rx, ry = min(rx, w / 2), min(ry, h / 2)
-    if not (rx and ry):
-        return [[Straight(np.array([(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)]))]]
-    parts: list[Segment] = []
-    corners = (x + w - rx, y + ry), (x + w - rx, y + h - ry), (x + rx, y + h - ry), (x + rx, y + ry)
-    axes = np.diag([rx, ry])
-    last = np.array([x + rx, y])
-    for k, corner in enumerate(corners):
-        arc = EllipticArc(np.array(corner), axes, (k - 1) * np.pi / 2, np.pi / 2)
-        ends = arc.points(np.inf)
-        parts += [Straight(np.array([last, ends[0]])), arc]
-        last = ends[-1]
-    return [[part for part in parts if extent(part.points(np.inf)) > 0]]
 
 
 def _within(points: Callable[[float], Array], corners: Array) -> bool:
