@@ -254,8 +254,8 @@ def test_a_kernel_that_does_not_compile_leaves_the_clock_running(own_store):
     assert not compiling.busy()
 
 
-def test_importing_the_clock_does_not_import_numba():
-    code = "import sys, flatpush, flatpush.compiling; sys.exit('numba' in sys.modules)"
+def test_neither_the_clock_nor_the_controllers_import_numba():
+    code = "import sys, flatpush.control, flatpush.compiling; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...geometry.pose import Array
 from ...planning.query import Query
-from ...planning.refine import improvements
 from ...steering.fleet import Fleet
 from .contact_car import ContactCar
 
@@ -22,6 +21,8 @@ def next_push(
         pose, goal: X_WO; the goal's angle is NaN where any will do.
         switching: what another landing costs [m]. seed: of the search.
     """
+    from ...planning.refine import improvements  # its kernels are needed by no other controller
+
     usable = [k for k, car in enumerate(cars) if car is not None]
     if not usable:
         return None
