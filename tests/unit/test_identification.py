@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flatpush.documents import load_pairs, load_surface
+from flatpush.documents import load_pairs, load_scene, load_surface
 from flatpush.errors import InputError
 from flatpush.friction import Ellipsoid, Exact, Support, fit_loads
 from flatpush.friction.cross_validation import (
@@ -23,6 +23,7 @@ from flatpush.friction.cross_validation import (
 )
 from flatpush.friction.loads import equilibrium, radial_parts
 from flatpush.friction.pairs import Pairs
+from flatpush.friction.report import twist_angles
 from flatpush.geometry import Outline
 
 FEET = np.array([(-0.03, -0.02), (0.04, -0.01), (0.0, 0.03)])
@@ -311,6 +312,47 @@ def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path, monkeypatch, 
     status, out, err = flatpush("describe", str(scene), "--json", monkeypatch=monkeypatch, capsys=capsys)
     assert status == 0
     assert json.loads(out)["pushes"]
+
+
+@pytest.mark.slow
+def test_a_scene_is_written_with_what_predicts_best(tmp_path, monkeypatch, capsys) -> None:
+    """Loads as the support in the scene's own units; their mean with the quartic as a quartic that is near it."""
+    moved = Support.points(FEET - Support.points(FEET, [5, 2, 3]).centre, [5, 2, 3])
+    V = twists(30)
+    path = write(tmp_path / "pairs.csv", table(Pairs(moved.wrench(V, 0.3, 10), V)))
+    scene, target = tmp_path / "scene.yaml", tmp_path / "fitted.yaml"
+    feet = [[*(1000 * foot), w] for foot, w in zip(FEET, [5.0, 2.0, 3.0], strict=True)]
+    feet = [[float(x) for x in foot] for foot in feet]
+    scene.write_text(
+        "flatpush: scene/1\nunits: {length: mm}\n"
+        "object: {outline: [[-50, -50], [50, -50], [50, 50], [-50, 50]], friction: 0.3,"
+        f" support: {{points: {feet}}}}}\nstart: [0, -200, 0]\ngoal: [0, 0, 0]\n"
+    )
+    call = ("identify", str(path), "--scene", str(scene), "-o", str(target), "--seeds", "1")
+    status, out, err = flatpush(*call, monkeypatch=monkeypatch, capsys=capsys)
+    assert status == 0, err
+    assert "chosen: loads" in out
+    points, shares = load_scene(target).object.support.feet
+    order = np.argsort(points[:, 0])
+    assert points[order] == pytest.approx(FEET[np.argsort(FEET[:, 0])], abs=1e-9)
+    assert shares[order] == pytest.approx(np.array([0.5, 0.2, 0.3])[np.argsort(FEET[:, 0])], abs=1e-3)
+    status, out, err = flatpush(*call, "--model", "mean", monkeypatch=monkeypatch, capsys=capsys)
+    assert status == 0, err
+    assert "written as a quartic that is" in out
+    surface = load_scene(target).object.surface
+    angles = twist_angles(surface.twist(moved.wrench(V)), V, 0.03)
+    assert np.rad2deg(np.mean(angles)) < 8
+    for extra, words in (("surface.json", "is written as a scene"), ("other.yaml", "--scene SCENE")):
+        short = [
+            "identify",
+            str(path),
+            "-o",
+            str(tmp_path / extra),
+            *(["--model", "loads"] if "json" in extra else []),
+        ]
+        status, _, err = flatpush(*short, monkeypatch=monkeypatch, capsys=capsys)
+        assert status == 2
+        assert words in err
 
 
 def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path, monkeypatch, capsys) -> None:

@@ -1,14 +1,20 @@
 """flatpush identify: limit surfaces from measured pairs of wrench and twist, or the table from motion alone."""
 
+import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
 from .common import print_json, telling
 
-MODELS = ("auto", "ellipsoid", "quartic")
+if TYPE_CHECKING:
+    from ..friction import Quartic
+    from ..geometry.pose import Array
+
+SMOOTH = ("ellipsoid", "quartic")
+MODELS = ("auto", *SMOOTH, "loads", "mean")
 
 
 def command(
@@ -36,7 +42,8 @@ def command(
     model: Annotated[
         str,
         typer.Option(
-            metavar="MODEL", help="Write and draw this one: auto (the better one), ellipsoid or quartic."
+            metavar="MODEL",
+            help="Write this: auto (the best), ellipsoid, quartic; loads, mean (-o scene.yaml).",
         ),
     ] = "auto",
     scene: Annotated[
@@ -77,6 +84,11 @@ def command(
 
     if model not in MODELS:
         raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
+    whole = output is not None and output.suffix.lower() in (".yaml", ".yml")
+    if whole and scene is None:
+        raise InputError("a scene is written from one", source=str(output), hint="--scene SCENE")
+    if model in ("loads", "mean") and not whole:
+        raise InputError(f"the model {model} is written as a scene", hint="--scene SCENE -o fitted.yaml")
     if seeds < 1:
         raise InputError("--seeds is at least 1", value=seeds)
     if folds < 2:
@@ -116,8 +128,10 @@ def command(
     found = []
     for pairs in experiments:
         with telling(f"fitting {pairs.name}"):
-            found.append(_Found(pairs, places, length, folds, seeds, model))
-    if output is not None:
+            found.append(_Found(pairs, places, length, folds, seeds, model, every=whole))
+    if output is not None and scene is not None and whole:
+        _write_scene(found[0], scene, output)
+    elif output is not None:
         save_surface(found[0].surface, output)
     if figure is not None:
         with telling("drawing"):
@@ -136,7 +150,7 @@ class _Found:
     """The fits of one experiment and how they were judged."""
 
     def __init__(
-        self, pairs: Any, places: Any, length: float | None, folds: int, seeds: int, model: str
+        self, pairs: Any, places: Any, length: float | None, folds: int, seeds: int, model: str, every: bool
     ) -> None:
         from ..friction import fit_ellipsoid, fit_loads, fit_quartic, sized
         from ..friction.cross_validation import Loads, Smooth, blended, choose, judge
@@ -161,9 +175,34 @@ class _Found:
             self.loads = fit_loads(
                 pairs.wrenches, pairs.twists, *places[:2], nominal=places[2], trust=self.trust
             )
-        better = min(("ellipsoid", "quartic"), key=lambda name: self.judged[name].mean)
-        self.model = better if model == "auto" else model
-        self.surface = self.fits[self.model]
+        choices = list(self.judged) if every else SMOOTH
+        self.model = min(choices, key=lambda name: self.judged[name].mean) if model == "auto" else model
+        self.surface = self.fits[self.model if self.model in SMOOTH else "quartic"]
+        self.beside = 0.0  # of a written mean, from the mean itself
+        if self.model == "mean":
+            self.surface, self.beside = self._mean()
+
+    def _mean(self) -> "tuple[Quartic, float]":
+        """A convex quartic fitted to the mean of the unit twists of quartic and loads, over wrenches all round, and the
+        mean angle between the two on the measured wrenches [rad]."""
+        import numpy as np
+
+        from ..friction import fit_quartic
+        from ..friction.report import twist_angles
+
+        units = np.array([1.0, 1.0, self.length])
+        models = (self.fits["quartic"], self.loads.surface) if self.loads else (self.fits["quartic"],)
+
+        def mean(wrenches: "Array") -> "Array":
+            twists = [m.twist(wrenches) * units for m in models]
+            return np.sum([V / np.linalg.norm(V, axis=1, keepdims=True) for V in twists], axis=0) / units
+
+        around = np.random.default_rng(0).normal(size=(200, 3)) * [1.0, 1.0, self.length]
+        around = np.concatenate([around, self.pairs.wrenches])
+        around /= self.fits["quartic"].value(around)[:, None] ** 0.25
+        fitted = fit_quartic(around, mean(around), regularisation=0.001, force_weight=0.05)
+        angles = twist_angles(fitted.twist(self.pairs.wrenches), mean(self.pairs.wrenches), self.length)
+        return fitted, float(np.mean(angles))
 
     def document(self) -> dict[str, object]:
         from ..documents.surface_file import surface_form
@@ -245,6 +284,18 @@ def _places(scene: Path) -> Any:
     return radial_parts(thing.outline.translated(-thing.cof))
 
 
+def _write_scene(found: _Found, scene: Path, output: Path) -> None:
+    """The scene with the model that was chosen: loads as its support, else a surface."""
+    from ..documents import load_scene, save_fitted_scene
+
+    note = f"{found.model} fitted to {len(found.pairs)} pairs of wrench and twist"
+    if found.model == "loads" and found.loads is not None:
+        support = found.loads.support.translated(load_scene(scene).object.cof)
+        save_fitted_scene(scene, output, support=support, note=note)
+    else:
+        save_fitted_scene(scene, output, surface=found.surface, note=note)
+
+
 def _tell(found: list[_Found]) -> None:
     from ..view.angle_table import angle_table
 
@@ -260,6 +311,10 @@ def _tell(found: list[_Found]) -> None:
             f"{name} λ = {w[0]:g}, β = {w[1]:g}" for name, w in f.weights.items() if name != "loads"
         )
         typer.echo(f"{f.pairs.name}: ℓ = {1000 * f.length:.1f} mm, {weights}; chosen: {f.model}")
+        if f.model == "mean":
+            typer.echo(
+                f"  written as a quartic that is {math.degrees(f.beside):.1f}° from the mean on these pushes"
+            )
         if f.loads is not None:
             shares = ", ".join(f"{share:.3f}" for share in f.loads.shares)
             typer.echo(f"  loads {shares} of the whole; friction × load {f.loads.resistance:.2f} N")
@@ -277,11 +332,12 @@ def _draw(found: list[_Found], path: Path) -> None:
     from ..view.surface_figure import surface_figure
 
     f = found[0]
-    names = sorted(("ellipsoid", "quartic"), key=lambda name: name != f.model)
+    first = f.model if f.model in SMOOTH else "quartic"
+    names = sorted(SMOOTH, key=lambda name: name != first)
     surfaces: dict[str, Any] = {name: (f.fits[name], 1.0) for name in names}
     if f.loads is not None:
         surfaces["loads"] = (f.loads.surface, f.loads.resistance)
     surface_figure(
         surfaces, f.pairs, f.length, path, title=f"Limit surfaces of {f.pairs.name}, {len(f.pairs)} pushes",
-        subtitle=f"in space: the {f.model} with all pushes; ℓ = {1000 * f.length:.1f} mm",
+        subtitle=f"in space: the {first} with all pushes; ℓ = {1000 * f.length:.1f} mm",
     )  # fmt: skip

@@ -61,7 +61,9 @@ def identify_motion(asked: Asked) -> int:
         )
     if asked.output is not None:
         note = f"support and friction fitted to the motion of {len(set(fit.seen.stretches.push))} pushes"
-        save_fitted_scene(asked.scene, asked.output, fit.thing.support, fit.thing.friction, note)
+        save_fitted_scene(
+            asked.scene, asked.output, support=fit.thing.support, friction=fit.thing.friction, note=note
+        )
     if asked.as_json:
         print_json(_document(fit, summary, names, found, next_))
         return 0

@@ -6,26 +6,30 @@ from typing import Any
 
 import yaml
 
-from ..friction import Support
+from ..friction import LimitSurface, Support
 from .atomic import write_atomically
 from .context import PER_METRE
 from .reading import read_mapping
+from .surface_file import surface_form
 
 
 def save_fitted_scene(
     scene: str | os.PathLike[str],
     path: str | os.PathLike[str],
-    support: Support,
-    friction: float,
+    *,
+    support: Support | None = None,
+    friction: float | None = None,
+    surface: LimitSurface | None = None,
     note: str = "",
 ) -> None:
-    """Writes the scene of a file with a support on feet and a friction that were found, in the file's own units.
+    """Writes the scene of a file with what was found of its friction, in the file's own units.
 
-    A known limit surface is dropped, as the support now says it; paths stay those of the same files.
+    A limit surface takes the place of a known one, and a support too, as it now says it; paths stay those of the same
+    files.
 
     Args:
         scene: the file that is changed. path: what is written.
-        support: on feet, in O [m]. friction: between fingertip and object.
+        support: on feet, in O [m]. friction: between fingertip and object. surface: about the centre of friction, SI.
         note: comments at the top, lines.
 
     Raises:
@@ -35,16 +39,14 @@ def save_fitted_scene(
     units = document.get("units") or {}
     per_metre = PER_METRE[units.get("length", "m")]
     thing = dict(document["object"])
-    thing.pop("surface", None)
-    points, weights = support.feet
-    total = float(weights.sum())
-    thing["support"] = {
-        "points": [
-            [round(float(x) * per_metre, 9), round(float(y) * per_metre, 9), float(f"{w / total:.6g}")]
-            for (x, y), w in zip(points, weights, strict=True)
-        ]
-    }
-    thing["friction"] = float(f"{friction:.6g}")
+    if support is not None or surface is not None:
+        thing.pop("surface", None)
+    if surface is not None:
+        thing["surface"] = surface_form(surface)
+    if support is not None:
+        thing["support"] = _feet(support, per_metre)
+    if friction is not None:
+        thing["friction"] = float(f"{friction:.6g}")
     outline = thing.get("outline")
     if isinstance(outline, dict) and "file" in outline:
         drawing = Path(scene).parent / str(outline["file"])
@@ -53,3 +55,13 @@ def save_fitted_scene(
     head = "".join(f"# {line}\n" for line in note.splitlines())
     text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
     write_atomically(path, head + text)
+
+
+def _feet(support: Support, per_metre: float) -> dict[str, Any]:
+    points, weights = support.feet
+    shares = weights / weights.sum()
+    table = [
+        [round(float(x) * per_metre, 9), round(float(y) * per_metre, 9), float(f"{share:.6g}")]
+        for (x, y), share in zip(points, shares, strict=True)
+    ]
+    return {"points": table}

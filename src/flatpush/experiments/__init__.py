@@ -23,6 +23,7 @@ EXPERIMENTS = {
     "feedback": "random tasks of one finger under feedback, on another table than believed (--runs, --seed)",
     "push-t": "the learners' benchmark of pushing without friction, solved by planning (--seeds)",
     "force-pushes": "limit surfaces fitted to the recorded force pushes (--data)",
+    "motion-pushes": "the same pushes without their forces: loads and friction from motion (--data)",
 }
 # Those that take a number of runs and a seed.
 RANDOM = {"feedback", "fig6", "fig7", "fig8", "fig9"}
@@ -31,7 +32,7 @@ TOGETHER = dict.fromkeys(("fig6", "fig7", "fig8", "fig9"), "robot_runs")
 # Those that take a range of seeds.
 SEEDED = {"push-t"}
 # Those that need the folder of recorded data.
-RECORDED = {"force-pushes", "replay"}
+RECORDED = {"force-pushes", "motion-pushes", "replay"}
 
 
 def experiment(

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Object
 from ..simulation.calibration import Parameters, Setup, contact_calibration, fit_to_ends
+from ..simulation.joint_calibration import calibrate
 from ..simulation.replay import Recording, Replayed, errors, rigid, trajectory_errors
 
 GOAL = np.array([0.0, -0.3175, 0.0])
@@ -155,6 +156,18 @@ def cases(recordings: tuple[Recording, ...], given: Setup) -> Iterable[Case]:
         best = fitted_on(fitted, given)
         title = f"simulated, μ {best.friction:.2f}"
         yield judged(title, name, tested, given, best)
+    yield starts_left_out(recordings, given)
+
+
+def starts_left_out(recordings: tuple[Recording, ...], given: Setup) -> Case:
+    """Contacts and ends in one fit; each start is predicted by the runs from the others. One block is both
+    rectangles, with one tag."""
+    found = calibrate(recordings, replace(given, tags=dict.fromkeys(NAMES[:2], "rectangle")))
+    names = tuple(one.run.object for one in recordings)
+    return Case(
+        f"simulated, μ {found.parameters.friction:.2f}", "all, on other starts", names, found.left_out,
+        np.full((len(names), 2), np.nan),
+    )  # fmt: skip
 
 
 def fitted_on(recordings: list[Recording], given: Setup) -> Parameters:

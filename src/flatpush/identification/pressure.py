@@ -12,8 +12,9 @@ from ..friction.patches import patches
 from ..geometry import Outline
 from ..geometry.pose import Array
 
-# Standard deviation of the logarithm of a load on a known foot, of a density, and of the shares of face and rim.
-SD_FOOT, SD_DENSITY, SD_RIM = 1.0, 1.0, 3.0
+# Standard deviation of the logarithm of a load on a known foot (statics tells it that well), of one anywhere, of a
+# density, and of the shares of face and rim.
+SD_FOOT, SD_FREE, SD_DENSITY, SD_RIM = 0.4, 1.0, 1.0, 3.0
 # A density is alike over so much of the object's size; so many ways in which it may differ are kept.
 ALIKE, WAYS = 0.3, 18
 # Places of the face and of the rim on which a density is spread.
@@ -150,7 +151,7 @@ class FreeFeet(AbstractPressure):
 
     @property
     def precision(self) -> Array:
-        return np.repeat([SD_FOOT**-2, SD_PLACE**-2], [self.count, 2 * self.count])
+        return np.repeat([SD_FREE**-2, SD_PLACE**-2], [self.count, 2 * self.count])
 
     @property
     def _middle(self) -> Array:

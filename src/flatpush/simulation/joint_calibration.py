@@ -17,7 +17,6 @@ from .calibration import (
     CAMERA,
     FRICTION,
     INSET,
-    LEVER,
     SHIFT,
     STICKING,
     TAG,
@@ -34,6 +33,8 @@ from .replay import Recording, errors
 
 # Standard deviations [mm]: of a contact over a stretch, of the end of a run, and of the ends of earlier pushes.
 CONTACT, END, INNER_END = 0.25, 0.4, 0.8
+# What a millimetre is held to be worth in turn: this lever [m], twice that of the ends alone, as tags see angles well.
+LEVER = 0.06
 # Residuals beyond so many of these count less (Cauchy).
 SOFT = 2.0
 # How strongly the nominal values hold, in parts of the scales of the numbers.
