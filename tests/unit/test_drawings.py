@@ -257,6 +257,25 @@ def test_an_outline_of_pixel_steps_is_made_smooth(tmp_path: Path) -> None:
     assert "corners of pixels, made smooth within 0.5 mm" in note.lines[0]
 
 
+def test_corners_within_a_straight_side_of_pixels_do_not_matter() -> None:
+    """A tracer that lists the corners of every pixel: its outline was taken with all the steps."""
+    from flatpush.documents.bitmap import without_steps
+
+    rows = np.arange(-40, 40)
+    widths = np.floor(70 * np.sqrt(1 - ((rows + 0.5) / 40) ** 2))
+    right = [(w, float(r + side)) for w, r in zip(widths, rows, strict=True) for side in (0, 1)]
+    every = np.array([*right, *((-x, y) for x, y in reversed(right))])
+    found = without_steps(every)
+    assert found is not None
+    smooth, tolerance = found
+    x, y = smooth.T
+    assert tolerance == 1.0
+    assert abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 == pytest.approx(2 * widths.sum(), rel=0.01)
+    sides = np.roll(smooth, -1, axis=0) - smooth
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))))
+    assert turns.max() < np.deg2rad(60)  # steps turn by 90°
+
+
 def test_a_rack_is_not_an_outline_of_pixels() -> None:
     """Teeth run along the axes in equal steps too, but turn twice the same way."""
     from flatpush.documents.bitmap import without_steps

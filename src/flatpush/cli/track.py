@@ -85,7 +85,7 @@ def command(
 ) -> int:
     """Follow PLAN under feedback, in the contact simulator with a simulated camera."""
     from ..control import ARRIVED, Camera
-    from ..control.tracking.plan_controller import goal_error
+    from ..control.tracking.plan_controller import BESIDE, goal_error
     from ..control.tracking.simulated_run import TrackedRun
     from ..documents import check_outputs, load_plan, plan_files
 
@@ -142,7 +142,8 @@ def command(
     if figure is not None:
         from ..view.track_figure import track_figure
 
-        title = f"{controller} at {rate:g} Hz: {run.outcome}, off the goal by {error_text(distance, turn)}"
+        beside = "" if run.outcome.startswith(BESIDE) else f", off the goal by {error_text(distance, turn)}"
+        title = f"{controller} at {rate:g} Hz: {run.outcome}{beside}"
         track_figure(loaded, run, figure, title)
     if as_json:
         print_json(result)

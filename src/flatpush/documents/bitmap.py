@@ -104,8 +104,13 @@ def smooth_outline(mask: NDArray[np.bool_]) -> Array | None:
 def without_steps(corners: Array) -> tuple[Array, float] | None:
     """An outline of pixels without its steps, shape (n, 2), and the tolerance; None if it is not one of pixels.
 
-    Of pixels is what goes along the axes in multiples of one length, turning to the left and to the right by turns.
+    Of pixels is what goes along the axes in multiples of one length, turning to the left and to the right by turns;
+    corners within a straight side do not matter.
     """
+    bends = cross(corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners)
+    corners = corners[
+        np.abs(bends) > 1e-9 * np.ptp(corners, axis=0).max() ** 2
+    ]  # not those within a straight side
     if len(corners) < _LEAST:
         return None
     edges = np.roll(corners, -1, axis=0) - corners

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..geometry.pose import Array
 from . import drawing as d
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .panel import BOTTOM, LEFT, frame_for
@@ -26,7 +27,7 @@ class Entry:
 
     label: str
     look: Look
-    symbol: Literal["line", "box", "dot", "line and dot"] = "line"
+    symbol: Literal["line", "box", "dot", "line and dot", "mass"] = "line"
     signs: bool = False
     mark: str = "o"
 
@@ -101,6 +102,8 @@ def _draw_symbol(page: Drawing, entry: Entry, x: float, y: float) -> None:
         page.add(d.Line(corners, look, closed=True), 20)
     if entry.symbol in ("line", "line and dot"):
         page.add(d.Line(np.array([[x, y], [x + _SYMBOL, y]]), look), 20)
+    if entry.symbol == "mass":
+        draw_mass(page, np.array([x + _SYMBOL / 2, y]), 3.4, 20)
     if entry.symbol in ("dot", "line and dot"):
         middle = np.array([x + _SYMBOL / 2, y])
         around = Look(look.stroke, 0.9, fill=look.fill or look.stroke)
@@ -110,6 +113,14 @@ def _draw_symbol(page: Drawing, entry: Entry, x: float, y: float) -> None:
             arms = {"+": ((1.7, 0.0), (0.0, 1.7)), "−": ((1.7, 0.0),), "": ()}[sign]
             for arm in arms:
                 page.add(d.Line(np.stack([centre - arm, centre + arm]), Look(look.stroke, 0.9)), 20)
+
+
+def draw_mass(page: Drawing, middle: Array, radius: float, z: float, clip: Box | None = None) -> None:
+    """The centre of friction, as centres of mass are drawn."""
+    page.add(d.Disc(middle, radius, Look(INK, 0.9, fill="#ffffff")), z, clip)
+    for start in (0.0, np.pi):
+        arc = d.arc_points(middle, radius, start, start + np.pi / 2)
+        page.add(d.Line(np.concatenate([middle[None], arc]), Look(fill=INK), closed=True), z + 0.1, clip)
 
 
 def _title_lines(title: str, subtitle: str, width: float) -> list[tuple[str, float, float, bool]]:

@@ -15,7 +15,7 @@ from . import drawing as d
 from . import palette, words
 from .drawing import INK, PAGE, SOFT, Box, Drawing, Look
 from .labels import Labels, dense
-from .legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
+from .legend import EDGE, Entry, draw_legend, draw_mass, draw_title, legend_height, title_height
 from .panel import BOTTOM, LEFT, Panel
 from .picture import check_ending, save_picture
 from .plan_figure import cone_length
@@ -216,15 +216,10 @@ def _object(panel: Panel, scene: Scene, sketch: PushSketch) -> None:
     for tip, point in zip(MM * tips, MM * points, strict=True):
         panel.disc(tip, tip_size(panel, scene), Look(palette.PUSHER, 0.8, fill="#bdbdbd"), 4)
         panel.disc(point, 1.3, Look(fill=INK), 8)
-    # The centre of friction, as centres of mass are drawn; a size that leaves the flat point beside it visible.
+    # Of a size that leaves the flat point beside it visible.
     middle = panel.at(MM * sketch.cof)
     radius = min(DOT + 0.6, max(panel.length(0.03 * MM * scene.object.outline.size), 2.0))
-    panel.page.add(d.Disc(middle, radius, Look(INK, 0.9, fill="#ffffff")), 7, panel.frame)
-    for start in (0.0, np.pi):
-        arc = d.arc_points(middle, radius, start, start + np.pi / 2)
-        panel.page.add(
-            d.Line(np.concatenate([middle[None], arc]), Look(fill=INK), closed=True), 7.1, panel.frame
-        )
+    draw_mass(panel.page, middle, radius, 7, panel.frame)
 
 
 def _rotation_centres(panel: Panel, sketch: PushSketch, pointers: bool) -> None:
@@ -354,7 +349,7 @@ def _legend(scene: Scene, sketches: Sequence[PushSketch]) -> list[Entry]:
     entries = [
         Entry(words.FRICTION_CONE, Look(force, fill=force, fill_opacity=0.12), "box"),
         Entry("motion cone of the contact", Look(motion, fill=motion, fill_opacity=0.12), "box"),
-        Entry("centre of friction", Look(INK, fill="#ffffff"), "dot"),
+        Entry("centre of friction", Look(INK), "mass"),
         Entry("contact to centre of friction", LEVER),
     ]
     steering = [s for s in sketches if s.steers]

@@ -35,7 +35,7 @@ CONTACTS = {
     "": ("not known", "#eeeeee"),
 }
 MODES = {
-    "path": "#4477aa", "tracking": "#4477aa", "posture": "#66ccee", "push": "#4477aa", "look": "#d9cf8a",
+    "path": "#4477aa", "tracking": "#332288", "posture": "#66ccee", "push": "#4477aa", "look": "#d9cf8a",
     "looking": "#d9cf8a", "resume": "#228833", "retreat": "#e6a100", "saturated": "#cc3311", "guarded": "#ee7733",
     "waiting": "#777777", "held": "#111111", "transit": "#aa3377", "done": "#002f5c",
 }  # fmt: skip
