@@ -70,6 +70,7 @@ def execution_findings(scene: Scene, segments: Sequence[Segment]) -> tuple[Findi
 def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
     yield from _order(segments)
     pose = scene.start_pose
+    yield from _wound(_pushes(segments)[:1], pose)
     placements = {s.push: placement_of(scene, named(scene, s.push)) for s in _pushes(segments)}
     for k, segment in enumerate(segments):
         label = f"segment {k} ({segment.kind})"
@@ -85,6 +86,7 @@ def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
             hands = [segment.fingers]
         else:
             hands = [s.fingers for s in _neighbours(segments, k)]
+            yield _turned(segment, label)
             yield from _heights(scene, segment, label)
             for hand in hands:
                 yield from _free(scene, segment, pose, hand, label)
@@ -112,6 +114,19 @@ def _order(segments: Sequence[Segment]) -> Iterator[Finding]:
             )
 
 
+def _wound(first: Sequence[PushSegment], pose: Array) -> Iterator[Finding]:
+    """The yaw of the first push is within half a turn of the object's: later ones follow from it without a jump."""
+    for push in first:
+        away = DEGREES * abs(float(push.pusher[0, 2] - pose[2]))
+        yield Finding("yaw at the start is turns away", away, 180 + DEGREES * SAME, "°", "the first push")
+
+
+def _turned(segment: TransitSegment, label: str) -> Finding:
+    """Between two poses a hand needs half a turn at most."""
+    turn = DEGREES * float(np.sum(np.abs(np.diff(segment.pusher[:, 2]))))
+    return Finding("turns that are not needed", turn, 180 + DEGREES * SAME, "°", label)
+
+
 def _joint(before: Segment, after: Segment, label: str) -> Iterator[Finding]:
     step = np.abs(after.pusher[0] - before.pusher[-1])
     where = f"{label}, sample 0"
@@ -133,7 +148,7 @@ def _clock(segment: Segment, label: str) -> Finding:
 
 
 def _starts(segment: PushSegment, pose: Array, label: str) -> Iterator[Finding]:
-    error = np.abs(pose_error(segment.object[0], pose))
+    error = np.abs(segment.object[0] - pose)  # the angle as it stands: the object makes no turn between pushes
     where = f"{label}, sample 0"
     yield Finding(
         "push starts beside where the object is", MM * float(np.hypot(*error[:2])), MM * SAME, "mm", where
