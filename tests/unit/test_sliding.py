@@ -5,11 +5,13 @@ import pytest
 
 import flatpush as fp
 from flatpush.errors import InputError
-from flatpush.geometry import compose, pose_error, transform
+from flatpush.geometry import Outline, compose, pose_error, transform
+from flatpush.geometry.collision import World
 from flatpush.geometry.pose import cross
 from flatpush.gym import PushTPolicy
 from flatpush.gym.push_t import CENTRE_OF_GRAVITY, GOAL, MOMENT, PIXEL, SOLVED, TIP, check_environment, tee
-from flatpush.planning.sliding import SlideSearch, slide_library
+from flatpush.planning.sliding import SlidePlanner, SlideSearch, slide_library
+from flatpush.planning.sliding.exact import STEADY, SWITCH
 from flatpush.simulation.plant import Plant
 
 
@@ -218,3 +220,108 @@ def test_a_finger_wider_than_every_gap_still_finds_the_outside():
     thing = fp.Object(tee().outline.vertices, friction=0.0)
     library = slide_library(thing, Plant(thing, [[0.0, 0.0]], 0.2), directions=[0.0], lengths=[0.01])
     assert 0 < len(library) < 60
+
+
+def slippery(name: str) -> fp.Object:
+    if name == "disc":
+        support = fp.Support.points([[0.008, 0.0], [0.02, 0.015], [0.02, -0.015]], [1.0, 1.0, 1.0])
+        return fp.Object(Outline.circle(0.03), support, friction=0.0)
+    surface = fp.Ellipsoid(np.diag([1.0, 1.0, 2000.0]))
+    return fp.Object(
+        [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)], friction=0.0, surface=surface
+    )
+
+
+@pytest.fixture(scope="module")
+def planner():
+    return SlidePlanner(Plant(slippery("rectangle"), [[0.0, 0.0]], 0.0025))
+
+
+def rolled_out(plant: Plant, pose, pushes):
+    """The whole plan from its start, each push as one straight way."""
+    for push in pushes:
+        pose = plant.follow(pose, np.column_stack([push.tip[[0, -1]], np.zeros(2)]), push_out=False).object[
+            -1
+        ]
+    return pose
+
+
+@pytest.mark.parametrize("start", [[0.02, 0.01, 0.5], [-0.13, 0.06, 2.5]])
+def test_plans_of_slides_end_at_the_goal_in_the_plant(planner, start):
+    """Against a rollout of the whole plan, every push from where the one before left the object."""
+    plan = planner.plan(start, np.zeros(3))
+    assert plan.status == "solved"
+    end = rolled_out(planner.plant, np.array(start), plan.pushes)
+    assert np.allclose(pose_error(end, np.zeros(3)), 0, atol=[2e-4, 2e-4, 3e-3])
+    lengths = [np.linalg.norm(push.tip[-1] - push.tip[0]) for push in plan.pushes]
+    assert plan.cost == pytest.approx(sum(lengths) + SWITCH * (len(lengths) - 1), abs=2e-3 * len(lengths))
+    again = planner.plan(start, np.zeros(3))
+    assert [p.length for p in again.pushes] == [p.length for p in plan.pushes]
+
+
+def test_each_plan_is_cheaper_than_the_one_before(planner):
+    costs = [plan.cost for plan in planner.plans([0.03, 0.02, 1.0], np.zeros(3))]
+    assert len(costs) >= 2
+    assert costs == sorted(costs, reverse=True)
+
+
+def test_growth_is_what_a_push_beside_its_way_does(planner):
+    slides, rng = planner.slides, np.random.default_rng(3)
+    for k in rng.choice(len(slides), 8, replace=False):
+        way = np.stack([slides.begin[k], slides.end[k]])
+        aside = np.array([way[0, 1] - way[1, 1], way[1, 0] - way[0, 0]])
+        aside *= 1e-4 / np.linalg.norm(aside)
+        moved = [
+            planner.plant.follow(np.zeros(3), np.column_stack([way + s * aside, np.zeros(2)])).object[-1]
+            for s in (0, 1)
+        ]
+        off = np.linalg.norm(slides.coordinates(moved[1]) - slides.coordinates(moved[0]))
+        assert slides.growth[k] == pytest.approx(off / 1e-4, abs=0.15)
+    assert slides.growth.max() <= STEADY
+
+
+def test_slides_keep_clear_of_obstacles_and_bounds():
+    """On the table: shapely measures object and fingertip at every sample, and the ways around."""
+    from shapely import LineString, Polygon
+
+    thing, start = slippery("rectangle"), np.array([0.06, 0.01, 0.4])
+    post = Outline.polygon([(0.025, 0.04), (0.035, 0.04), (0.035, 0.05), (0.025, 0.05)])
+    world = World.of((-0.06, -0.08, 0.14, 0.08), [post])
+    plant = Plant(thing, [[0.0, 0.0]], 0.0025)
+    plan = SlidePlanner(plant, world, clearance=0.001, planar=True).plan(start, np.zeros(3), tip=[0.1, 0.05])
+    assert plan.status == "solved"
+    obstacle, pose, left = Polygon(post.vertices), start, [0.1, 0.05]
+    for push in plan.pushes:
+        assert np.allclose(push.way[[0, -1]], [left, push.tip[0]], atol=1e-9)
+        around = LineString(push.way[1:-1])
+        assert Polygon(transform(pose, thing.outline.vertices)).distance(around) > 0.0025
+        assert obstacle.distance(around) >= 0.0035 - 1e-9
+        left = push.tip[-1]
+        for tip, pose in zip(push.tip, push.object, strict=True):
+            corners = transform(pose, thing.outline.vertices)
+            assert obstacle.distance(Polygon(corners)) >= 0.001 - 1e-9
+            for points, gap in ((corners, 0.001), (tip[None], 0.0035)):
+                assert np.all(points.min(axis=0) >= np.array([-0.06, -0.08]) + gap - 1e-9)
+                assert np.all(points.max(axis=0) <= np.array([0.14, 0.08]) - gap + 1e-9)
+    assert np.allclose(pose_error(plan.end, np.zeros(3)), 0, atol=3e-4)
+
+
+def test_a_disc_that_no_push_turns_is_refused():
+    """Pushed through its centre it never turns; asked for the heading it has, it is pushed."""
+    disc = fp.Object(Outline.circle(0.03), friction=0.0)
+    planner = SlidePlanner(Plant(disc, [[0.0, 0.0]], 0.0025))
+    refused = planner.plan([0.05, 0.0, 0.3], np.zeros(3))
+    assert refused.status == "no_plan"
+    assert "turns" in refused.reason
+    plan = planner.plan([0.05, 0.02, 0.3], [0.0, 0.0, 0.3])
+    assert plan.status == "solved"
+    end = rolled_out(planner.plant, np.array([0.05, 0.02, 0.3]), plan.pushes)
+    assert np.allclose(end, [0.0, 0.0, 0.3], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_disc_off_its_centre_is_turned_and_moved():
+    planner, start = SlidePlanner(Plant(slippery("disc"), [[0.0, 0.0]], 0.0025)), np.array([-0.06, 0.1, -1.2])
+    plan = planner.plan(start, np.zeros(3))
+    end = rolled_out(planner.plant, start, plan.pushes)
+    assert np.allclose(pose_error(end, np.zeros(3)), 0, atol=[2e-4, 2e-4, 5e-3])

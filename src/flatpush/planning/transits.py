@@ -184,17 +184,17 @@ class Transits:
         return pose
 
     @cached_property
-    def _networks(self) -> dict[float, "_Network"]:
+    def _networks(self) -> dict[float, "Network"]:
         return {}
 
     def _around(self, a: Array, b: Array, reach: float) -> Array:
         radius = reach + self.pusher.tip_radius + self.gap
         if radius not in self._networks:
-            self._networks[radius] = _Network(self.outline, radius)
+            self._networks[radius] = Network(self.outline, radius)
         return self._networks[radius].shortest(a, b)
 
 
-class _Network:
+class Network:
     """Shortest ways around an outline that is widened by a radius: straight between its convex corners."""
 
     def __init__(self, outline: Outline, radius: float) -> None:

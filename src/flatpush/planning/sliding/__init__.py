@@ -5,7 +5,16 @@ object's displacement does not depend on where the object is, so a push that was
 and a sequence of pushes is a product of displacements.
 """
 
+from .exact import SlidePlan, SlidePlanner, SlidePush
 from .sequences import Sequence, SlideSearch
 from .slides import SlideLibrary, slide_library
 
-__all__ = ["Sequence", "SlideLibrary", "SlideSearch", "slide_library"]
+__all__ = [
+    "Sequence",
+    "SlideLibrary",
+    "SlidePlan",
+    "SlidePlanner",
+    "SlidePush",
+    "SlideSearch",
+    "slide_library",
+]

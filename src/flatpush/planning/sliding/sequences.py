@@ -76,10 +76,10 @@ class SlideSearch:
     def approaches(self, goal: ArrayLike) -> Iterator[Sequence]:
         """Pairs of pushes, then single ones, that come nearest to a goal X_OG however far it is, nearest first."""
         target = self.slides.coordinates(goal)
-        moves = self.slides.displacement
-        for reached, pushes in ((self._pairs, self._doubles), (moves, self._singles)):
-            misses = np.linalg.norm(self.slides.coordinates(reached) - target, axis=1)
-            yield from _best(misses, pushes, FAR_KEPT)
+        for tree, pushes in ((self._pair_tree, self._doubles), (self._tree, self._singles)):
+            yield from _best(
+                np.sqrt(sum((tree.data[:, i] - target[i]) ** 2 for i in range(4))), pushes, FAR_KEPT
+            )
 
 
 def _completed(

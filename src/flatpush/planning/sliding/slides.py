@@ -1,13 +1,13 @@
 """Straight pushes with one finger, rolled out once each, whatever the contact does: stick, slide, let go."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
-from ...geometry import compose, transform
-from ...geometry.pose import Array, rotate
+from ...geometry import Outline, compose, transform
+from ...geometry.pose import Array, perpendicular, rotate
 from ...problem import Object
 from ...simulation.plant import Plant
 
@@ -16,6 +16,7 @@ CONTACTS = 0.04  # distance of neighbouring contacts, by the outline's size
 STEEPEST = np.deg2rad(60.0)  # angle between push and inward normal
 DIRECTIONS = 9
 LENGTHS = 0.02 * 1.5 ** np.arange(10)  # by the outline's size
+ASIDE = 1e-3  # by which the finger goes beside its way to see what that changes, by the outline's size
 BEFORE = 0.01  # the finger starts so far from the contact, by the outline's size
 
 
@@ -31,6 +32,8 @@ class SlideLibrary:
         displacement: pose of the object after the push in O at its beginning, shape (n, 3).
         cof: centre of friction in O, shape (2,) [m].
         reach: the outline's greatest distance from it [m]; with it angles are measured as lengths.
+        growth: how far the outline's farthest point ends elsewhere, about, if the finger goes beside its way, by that
+            distance, shape (n,).
     """
 
     edge: NDArray[np.intp]
@@ -42,9 +45,16 @@ class SlideLibrary:
     displacement: Array
     cof: Array
     reach: float
+    growth: Array
 
     def __len__(self) -> int:
         return len(self.length)
+
+    def steady(self, most: float) -> "SlideLibrary":
+        """The pushes of no more than so much growth."""
+        kept = self.growth <= most
+        rows = {f.name: getattr(self, f.name)[kept] for f in fields(self) if f.name not in ("cof", "reach")}
+        return replace(self, **rows)
 
     def coordinates(self, poses: ArrayLike) -> Array:
         """Poses (..., 3) as points (..., 4) whose distance is about the displacement of the outline's farthest point.
@@ -88,16 +98,13 @@ def slide_library(
     room = BEFORE * outline.size if before is None else before
     rows, touching, headings, starts = [], [], [], []
     for edge, along in places:
-        contact = outline.at(int(edge), float(along))
-        centre = contact.point - tip * contact.normal
         for angle in angles:
-            heading = rotate(angle, contact.normal)
-            start = centre - room / np.cos(angle) * heading
-            if outline.nearest(start).distance >= tip + 0.5 * room:
+            way = finger_way(outline, tip, room, (int(edge), float(along), angle))
+            if way is not None:
                 rows.append((edge, along, angle))
-                touching.append(centre)
-                headings.append(heading)
-                starts.append(start)
+                starts.append(way[0])
+                touching.append(way[1])
+                headings.append(way[2])
     if not rows:
         raise InputError("no finger of this radius reaches the outline", value=tip)
     touch, heading, begin = np.array(touching), np.array(headings), np.array(starts)
@@ -105,21 +112,50 @@ def slide_library(
     hand = np.zeros((len(rows), 2 + len(ways), 3))
     hand[..., :2] = np.concatenate([begin[:, None], touch[:, None], end], axis=1)
     hand[..., 2] = np.arctan2(heading[:, 1], heading[:, 0])[:, None]
-    runs = plant.many(np.zeros((len(rows), 3)), hand, push_out=False, record=True)
+    beside = hand.copy()
+    beside[..., :2] += ASIDE * outline.size * perpendicular(heading)[:, None]
+    runs, others = (
+        plant.many(np.zeros((len(rows), 3)), h, push_out=False, record=True) for h in (hand, beside)
+    )
     assert runs.object is not None
-    good = runs.outcome == 0
+    assert others.object is not None
+    good = (runs.outcome == 0) & (others.outcome == 0)
+    moved = runs.object[good][:, 2:].reshape(-1, 3)
+    elsewhere = others.object[good][:, 2:].reshape(-1, 3)
     number = np.array(rows)[good].repeat(len(ways), axis=0)
-    return SlideLibrary(
+    library = SlideLibrary(
         number[:, 0].astype(np.intp),
         number[:, 1],
         number[:, 2],
         np.tile(ways, int(good.sum())),
         begin[good].repeat(len(ways), axis=0),
         end[good].reshape(-1, 2),
-        runs.object[good][:, 2:].reshape(-1, 3),
+        moved,
         np.array(plant.cof),
         outline.radius_about(plant.cof),
+        np.zeros(len(moved)),
     )
+    off = np.linalg.norm(library.coordinates(elsewhere) - library.coordinates(moved), axis=1)
+    return replace(library, growth=off / (ASIDE * outline.size))
+
+
+def finger_way(
+    outline: Outline, tip: float, room: float, push: tuple[int, float, float]
+) -> tuple[Array, Array, Array] | None:
+    """Where the fingertip's centre is before a push and at contact, and the push's direction, each (2,) in O.
+
+    None if the finger would start in the object, or so near that it touched elsewhere.
+
+    Args:
+        tip: its radius [m]. room: as slide_library's `before`.
+        push: edge, place on it, and angle from the inward normal [rad].
+    """
+    edge, along, angle = push
+    contact = outline.at(edge, along)
+    centre = contact.point - tip * contact.normal
+    heading = rotate(angle, contact.normal)
+    start = centre - room / np.cos(angle) * heading
+    return (start, centre, heading) if outline.nearest(start).distance >= tip + 0.5 * room else None
 
 
 def _around(thing: Object) -> Array:
