@@ -45,6 +45,37 @@ def test_every_foot_carries_its_share(three_feet):
     assert model.geom("floor").pos[2] == pytest.approx(-high / 2 - 0.001)
 
 
+def test_feet_carry_their_share_while_they_slide_and_two_fingers_hold_a_turn(three_feet):
+    """Stiff feet hopped: a fifth of the time one carried nothing, and this plan, which the contact simulator has stick
+    with 20 % in reserve, ended 3.2 mm off its goal.
+    """
+    mujoco, pusher = load(), fp.Pusher(fingers=2, spacing=0.018)
+    pushes = (fp.Push("long edge", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(three_feet, (-0.06, -0.06, 1.2), pusher=pusher, pushes=pushes))
+    forces, force = [], np.zeros(6)
+    with CellRobot(plan) as robot:
+        model, data = robot._model, robot._data
+        floor = model.geom("floor").id
+
+        def told(cycle):
+            if "push" not in cycle.leg:
+                return
+            found = []
+            for k in range(data.ncon):
+                if floor in (data.contact[k].geom1, data.contact[k].geom2):
+                    mujoco.mj_contactForce(model, data, k, force)
+                    found.append(force[0])
+            forces.append(sorted(found) if len(found) == 3 else [0.0] * 3)
+
+        ended = run(plan, robot, told=told)
+    share = 0.98 * MASS * 9.81 / 3
+    assert np.min(forces) > 0.95 * share
+    assert np.max(forces) < 1.05 * share
+    error = pose_error(ended.object, plan.scene.goal)
+    assert np.hypot(*error[:2]) < 0.0005
+    assert abs(error[2]) < math.radians(0.3)
+
+
 def test_outlines_become_convex_pieces():
     corner = np.array([(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.04), (0, 0.04)])
     pieces = [shapely.Polygon(piece) for piece in convex_pieces(corner)]

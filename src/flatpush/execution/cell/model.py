@@ -22,8 +22,10 @@ STEM = 0.08  # length of a finger [m]
 # Of the tool's drives: stiffness [N/m] and damping [N s/m]; of the turning drive by LEVER² [N m/rad].
 STIFFNESS, DAMPING, LEVER = 4e4, 400.0, 0.03
 STEP = 0.001  # [s]
-# Time constants of contacts [s]: of a foot, and of a fingertip, which needs more than some steps to stick well.
-AT_FOOT, AT_TIP = 0.004, 0.01
+# Time constants [s] and impedances of contacts. MuJoCo's cone lifts what slides: a stiff foot hops, carries now nothing
+# and now twice its share, and each time the fingers slip a little, always to the same side. So feet are soft.
+AT_FOOT, FOOT_SOFT = 0.05, "0.9 0.9"
+AT_TIP, TIP_SOFT = 0.01, "0.99 0.999"
 # Pieces are joined while their union fills its hull to this part.
 CONVEX = 1e-6
 # An outline is drawn within this of its own [m].
@@ -77,9 +79,9 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Arm | None = None
         f' rgba="0.6 0.6 0.65 1" {_SHY}/>'
         for i, (x, y) in enumerate(tips + np.array(physics.tool))
     )
-    floor = "".join(_pair("floor", f"foot{k}", physics.table, AT_FOOT) for k in range(len(loads)))
+    floor = "".join(_pair("floor", f"foot{k}", physics.table, AT_FOOT, FOOT_SOFT) for k in range(len(loads)))
     touch = "".join(
-        _pair(name, f"tip{i}", physics.friction, AT_TIP) for name in names for i in range(len(tips))
+        _pair(name, f"tip{i}", physics.friction, AT_TIP, TIP_SOFT) for name in names for i in range(len(tips))
     )
     drives = "".join(
         f'<position joint="tool-{axis}" kp="{STIFFNESS * scale:g}" kv="{DAMPING * scale:g}"/>'
@@ -116,10 +118,10 @@ MODELS = {ARMS["irb120"].name: irb120, ARMS["fr3"].name: fr3}
 _SHY = 'contype="0" conaffinity="0"'  # touches only what a pair names
 
 
-def _pair(first: str, second: str, friction: float, time: float) -> str:
+def _pair(first: str, second: str, friction: float, time: float, soft: str) -> str:
     return (
         f'<pair geom1="{first}" geom2="{second}" condim="3" friction="{friction:.9g} {friction:.9g} 0 0 0"'
-        f' solref="{time} 1" solimp="0.99 0.999 0.0005"/>'
+        f' solref="{time} 1" solimp="{soft} 0.0005"/>'
     )
 
 
