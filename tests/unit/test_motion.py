@@ -264,6 +264,21 @@ def test_the_log_of_a_run_and_its_bag_hold_the_same_motion(tmp_path):
         )
 
 
+def test_the_log_of_two_fingers_is_no_push_at_one_point(tmp_path, scene, run):
+    """Midway between two fingers is a tip radius from a straight side, as one finger is: nothing else would tell."""
+    motion = pushed(pushes=PUSHES[:1])[0]
+    rows = ["t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id"]
+    for t, (x, y, turn), (px, py) in zip(motion.times, motion.poses, motion.tips, strict=True):
+        rows.append(f"{t},{1e3 * x},{1e3 * y},{turn},{1e3 * px},{1e3 * py},0,1")
+    log = tmp_path / "run.csv"
+    log.write_text("\n".join(rows) + "\n")
+    assert run(log, "--scene", scene)[0] == 0
+    scene.write_text(SCENE.replace("fingers: 1", "fingers: 2, spacing: 10"))
+    status, _, err = run(log, "--scene", scene)
+    assert status == 2
+    assert "two fingers do not push at one point" in err
+
+
 def changed(how):
     """Recordings with one thing wrong."""
     motions = pushed()[:2]

@@ -45,6 +45,12 @@ def identify_motion(asked: Asked) -> int:
     motions: list[Motion] = []
     for path in asked.data:
         file = load_motions(path, columns=columns, length=length, angle=angle, skip_bad=asked.skip_bad)
+        if file.of_hand and scene.pusher.fingers == 2:
+            raise InputError(
+                "this log holds poses of the hand, whose two fingers do not push at one point",
+                source=str(path),
+                hint="Friction from motion takes pushes of one finger, with a scene that says pusher: {fingers: 1}.",
+            )
         for row in file.left_out:
             typer.echo(f"{path}: line {row.line} left out: {row.reason}", err=True)
         motions += file.motions

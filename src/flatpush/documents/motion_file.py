@@ -49,10 +49,12 @@ class MotionFile:
 
     Attributes:
         motions: in their order. left_out: rows that cannot be used.
+        of_hand: whether the file holds poses of the hand (frame E): the fingertip's only where there is one finger.
     """
 
     motions: tuple[Motion, ...]
     left_out: tuple[BadRow, ...] = ()
+    of_hand: bool = False
 
 
 def load_motions(
@@ -249,7 +251,7 @@ def _from_robot(source: str, skip_bad: bool) -> MotionFile:
         table = np.column_stack([run.times, run.poses, run.hands[:, :2]])[run.seen]
         if len(table):
             motions += _parts(f"{Path(source).name}, {run.name}", table, run.lines[run.seen])
-    return MotionFile(tuple(motions), log.left_out)
+    return MotionFile(tuple(motions), log.left_out, of_hand=True)
 
 
 def _from_bag(source: str) -> MotionFile:
@@ -285,4 +287,4 @@ def _from_bag(source: str) -> MotionFile:
     table = np.column_stack([seen[:, :4], *tips])[low]
     if not len(table):
         raise InputError("the tool is never on the table in this bag", source=source)
-    return MotionFile(tuple(_parts(Path(source).name, table, np.flatnonzero(low) + 1)))
+    return MotionFile(tuple(_parts(Path(source).name, table, np.flatnonzero(low) + 1)), of_hand=True)
