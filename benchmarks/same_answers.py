@@ -6,20 +6,24 @@ OLD and NEW are folders of checkouts; their dependencies are those of this Pytho
 scenes (`random_scenes.py`, by iterations and not by the clock) in one process and simulates what it planned. Status,
 words, pushes, cost, certificate, simulated end and outcome are compared: numbers within 1e-9 (absolute below one,
 relative above). Every difference is printed with its scene and field; the exit status is 1 if there is one. What a
-clean commit answered is kept in the system's folder for temporary files, scene by scene, and not computed again.
+clean commit answered is kept in the system's folder for temporary files, scene by scene, and not computed again. A scene
+that takes one of them more than two minutes is left out of the comparison, and said.
 """
 
 import argparse
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 TOLERANCE = 1e-9
+PATIENCE = 120  # of a scene [CPU s], compiling included; old commits took hours for some
 HERE = Path(__file__).parent
+SLOW = "took too long"
 
 
 def answer(scene: object) -> dict[str, object]:
@@ -41,6 +45,8 @@ def answer(scene: object) -> dict[str, object]:
             plan.save(saved)
             certificate = json.loads(saved.read_text())["certificate"]
             end = fp.simulate(plan, seed=None)
+        except TimeoutError:
+            raise
         except FlatpushError as error:
             return {"status": "refused", "error": type(error).__name__}
         except Exception as error:  # what a comparison must not stop at
@@ -62,11 +68,22 @@ def work() -> None:
     sys.path.insert(0, str(HERE))
     from random_scenes import scene
 
+    def stop(*_: object) -> None:
+        raise TimeoutError
+
+    signal.signal(signal.SIGPROF, stop)
+
     for line in sys.stdin:
         name = line.strip()
         seed = name.removeprefix("random ")
         case: object = scene(int(seed)) if seed != name else Path("examples", name)
-        print(json.dumps({"name": name, **answer(case)}), flush=True)
+        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+        try:
+            found = answer(case)
+        except TimeoutError:
+            found = {"status": SLOW}
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        print(json.dumps({"name": name, **found}), flush=True)
 
 
 def differences(old: object, new: object, where: str = "") -> list[str]:
@@ -139,6 +156,9 @@ def main() -> int:
     old, new = (answers(path.resolve(), arguments) for path in (arguments.old, arguments.new))
     different, cheaper, dearer = 0, 0, 0
     for name in old:
+        if SLOW in (old[name]["status"], new[name]["status"]):
+            print(f"{name}: {' → '.join(str(side[name]['status']) for side in (old, new))}, not compared")
+            continue
         found = differences(old[name], new[name])
         if found:
             different += 1
