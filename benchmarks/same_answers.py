@@ -6,8 +6,8 @@ OLD and NEW are folders of checkouts; their dependencies are those of this Pytho
 scenes (`random_scenes.py`, by iterations and not by the clock) in one process and simulates what it planned. Status,
 words, pushes, cost, certificate, simulated end and outcome are compared: numbers within 1e-9 (absolute below one,
 relative above). Every difference is printed with its scene and field; the exit status is 1 if there is one. What a
-clean commit answered is kept in the system's folder for temporary files, scene by scene, and not computed again. A scene
-that takes one of them more than two minutes is left out of the comparison, and said.
+clean commit answered is kept in the system's folder for temporary files, scene by scene, and not computed again. A
+scene that takes one of them more than two minutes is left out of the comparison, and said.
 """
 
 import argparse
