@@ -36,6 +36,7 @@ BLOCK = "for (let k = 0; k < 2; k++) document.getElementById('add').click(); fla
 PAGES: dict[str, tuple[str, tuple[int, int], bool]] = {
     "page.png": ("", (1280, 720), False),
     "page_dark.png": (BLOCK, (1000, 700), True),
+    "page_mechanics.png": ("document.querySelector('[data-push=\"0\"]').click();", (1280, 720), False),
 }
 
 
@@ -70,6 +71,7 @@ def photograph(name: str) -> None:
             browser.execute_script(step)
             while not browser.execute_script("return window.flatpush && flatpush.answered && !flatpush.busy"):
                 time.sleep(0.1)
+        time.sleep(1.0)  # until what was asked for beside the plan is there
         browser.save_screenshot(str(IMAGES / name))
     finally:
         browser.quit()

@@ -478,6 +478,20 @@ def test_an_outline_is_drawn_by_clicking(page):
     assert page.plan["status"] == "solved"
 
 
+def test_the_mechanics_of_a_push_that_is_clicked_go_with_the_object(page):
+    page.browser.find_element("css selector", '#pushes [data-push="1"]').click()
+    page.wait("document.querySelectorAll('#mechanics > *').length > 4")
+    assert "friction cone" in page.text("hint")
+    assert page.js("return flatpush.mechanics.shown.push") == page.plan["traces"][1]["name"]
+    page.js("flatpush.player.show(0.7 * flatpush.player.duration)")
+    same = "return ['mechanics', 'object'].map((id) => document.getElementById(id).getAttribute('transform'))"
+    one, other = page.js(same)
+    assert one == other
+    page.js("flatpush.model.select('')")
+    assert page.js("return document.querySelectorAll('#mechanics > *').length") == 0
+    assert page.text("hint") == ""
+
+
 def test_the_pointer_is_a_finger_that_pushes(page):
     page.press("p")
     assert page.text("push") == "Push by hand"

@@ -17,6 +17,7 @@ from flatpush.page.by_hand import ByHand
 from flatpush.page.files import read_dropped, saved
 from flatpush.page.in_mm import refuse_files, scene_in_mm
 from flatpush.page.live import LivePlanner
+from flatpush.page.mechanics import mechanics
 from flatpush.page.picture import picture
 from flatpush.page.server import checked_message
 
@@ -302,3 +303,24 @@ def test_a_finger_beside_or_on_the_object_moves_nothing(square):
 def test_a_step_that_is_none_is_refused(square, wrong):
     with pytest.raises(InputError):
         square(-22, 0, -21, 0, **wrong)
+
+
+def test_the_mechanics_of_a_push_are_those_of_its_contact(planner, document):
+    """The friction cone has its half angle about the normal; a turn about each centre moves the contact along an edge
+    of the motion cone (one virtual contact, Fig. 2)."""
+    shown = json.loads(json.dumps(mechanics(planner.listed(document), "long edge"), allow_nan=False))
+    force, motion = (np.array(cone["edges"]) for cone in shown["cones"])
+    np.testing.assert_allclose(force @ [0, 1], np.cos(np.arctan(0.3)), atol=1e-4)  # the long edge is along x
+    contact = np.array(shown["contact"])
+    for centre in shown["centres"]:
+        x, y = contact - centre["at"]
+        way = np.array([-y, x]) * centre["sign"] / np.hypot(x, y)
+        assert np.max(motion @ way) == pytest.approx(1, abs=1e-4)
+    flat = np.mean([centre["at"] for centre in shown["centres"]], axis=0)
+    np.testing.assert_allclose(shown["flat"], flat, atol=2e-3)
+    assert shown["areas"] == []  # the middle of two fingers stands for one
+    document["planning"]["two_finger"] = "cone"
+    both = mechanics(planner.listed(document), "long edge")["areas"]
+    assert {area["colour"] for area in both} == {"#1f5fd0", "#c2189b"}
+    with pytest.raises(InputError, match="no push of this name"):
+        mechanics(planner.listed(document), "roof")

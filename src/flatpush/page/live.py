@@ -45,13 +45,20 @@ class LivePlanner:
             InputError: for a document that is no scene, or a start or a goal where something is in the way.
         """
         scene = parse_scene(document)
+        yield from self._prepared(document, scene).answers(scene, progress)
+
+    def listed(self, document: Mapping[str, object]) -> Scene:
+        """A scene with its pushes listed; errors as in answers."""
+        return self._prepared(document, parse_scene(document)).scene
+
+    def _prepared(self, document: Mapping[str, object], scene: Scene) -> "_Prepared":
         key = json.dumps({k: v for k, v in document.items() if k not in ("start", "goal")}, sort_keys=True)
         if key not in self._known:
             self._known[key] = _Prepared(scene)
             while len(self._known) > KEPT:
                 self._known.popitem(last=False)
         self._known.move_to_end(key)
-        yield from self._known[key].answers(scene, progress)
+        return self._known[key]
 
 
 class _Prepared:
@@ -60,6 +67,10 @@ class _Prepared:
     def __init__(self, scene: Scene) -> None:
         self._planner = Planner(scene)
         self._seed: Candidate | None = None
+
+    @property
+    def scene(self) -> Scene:
+        return self._planner.scene
 
     def answers(
         self, scene: Scene, progress: Progress | None

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 3_000_000  # of a message
 RATE, BURST = 150.0, 300.0  # messages a second that a page may send, and at once
-KINDS = "plan", "file", "save", "hand"
+KINDS = "plan", "file", "save", "hand", "mechanics"
 TRIES = 30  # ports
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _IN_USE = (errno.EADDRINUSE, errno.EACCES)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from .. import compiling
-from ..errors import FlatpushError
+from ..errors import FlatpushError, InputError
 from ..problem import Plan
 
 PAUSE = 0.06  # without a newer request, after which better plans are sought [s]
@@ -88,9 +88,12 @@ class _Worker:
         if kind != "plan":
             from .files import read_dropped, saved
 
+            answer: Answer
             try:
                 if kind == "hand":
                     answer = self._hand.step(value)
+                elif kind == "mechanics":
+                    answer = self._mechanics(value)
                 else:
                     answer = read_dropped(value) if kind == "file" else saved(value, self._plan.get(client))
             except FlatpushError as error:
@@ -155,6 +158,16 @@ class _Worker:
         except Exception as error:  # a mistake of ours: the page lives on, and says it
             traceback.print_exc()
             yield {"kind": "plan", "status": "refused", "reason": f"the planner failed: {error!r}"}
+
+    def _mechanics(self, value: Mapping[str, object]) -> Answer:
+        from .in_mm import refuse_files
+        from .mechanics import mechanics
+
+        scene, push = value.get("scene"), value.get("push")
+        if not isinstance(scene, dict) or not isinstance(push, str):
+            raise InputError("a scene and the name of a push are needed")
+        refuse_files(scene)
+        return mechanics(self._planner.listed(scene), push)
 
     def _tell_compiling(self, work: compiling.Work) -> None:
         self._requests.send(

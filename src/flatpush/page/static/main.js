@@ -4,6 +4,7 @@ import { Connection } from "./connection.js";
 import { centroid, corners, find, html, isCircle, near, place, radians, rounded, turned, within } from "./geometry.js";
 import { Hand } from "./hand.js";
 import { keep, linked, packed } from "./link.js";
+import { Mechanics } from "./mechanics.js";
 import { Model } from "./model.js";
 import { Panel } from "./panel.js";
 import { Player } from "./player.js";
@@ -12,7 +13,9 @@ import { Table, newOutline } from "./table.js";
 const model = new Model(), table = new Table(model), player = new Player(model), panel = new Panel(model, player);
 const connection = new Connection(new URLSearchParams(location.search).get("token") || "");
 const hand = table.hand = new Hand(model, table, connection);
-const state = { latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };
+const mechanics = new Mechanics(model, table, connection, player);
+player.moved = () => mechanics.follow();
+const state = { mechanics, latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };
 window.flatpush = state;   /* for whoever measures and tests */
 
 /* ---- messages of the server ---- */

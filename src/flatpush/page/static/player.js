@@ -85,6 +85,7 @@ export class Player {
     find("scrub").value = this.duration > 0 ? 1000 * this.now / this.duration : 0;
     set(find("scrub"), { "aria-valuetext": find("time").textContent + ", " + find("mode").textContent });
     this.dispatch(segment);
+    if (this.moved) this.moved();
   }
 
   dispatch(segment) {
