@@ -33,6 +33,10 @@ PICTURES: dict[str, list[str]] = {
 
 # Of the live page: what is done on it before the picture is taken, the size of the window, and whether it is dark.
 BLOCK = "for (let k = 0; k < 2; k++) document.getElementById('add').click(); flatpush.model.select('');"
+READY = (
+    "return window.flatpush && flatpush.answered && !flatpush.busy"
+    " && (!flatpush.mechanics.name || Boolean(flatpush.mechanics.shown));"
+)
 PAGES: dict[str, tuple[str, tuple[int, int], bool]] = {
     "page.png": ("", (1280, 720), False),
     "page_dark.png": (BLOCK, (1000, 700), True),
@@ -69,9 +73,8 @@ def photograph(name: str) -> None:
         browser.get(link)
         for step in ("", script, "flatpush.player.show(0.3 * flatpush.player.duration);"):
             browser.execute_script(step)
-            while not browser.execute_script("return window.flatpush && flatpush.answered && !flatpush.busy"):
+            while not browser.execute_script(READY):
                 time.sleep(0.1)
-        time.sleep(1.0)  # until what was asked for beside the plan is there
         browser.save_screenshot(str(IMAGES / name))
     finally:
         browser.quit()

@@ -33,7 +33,7 @@ export class Mechanics {
     if (told.centres.length === 2 && told.flat) parts.push(svg("path", { class: "axis", d: path(told.centres.map((c) => c.at), false) }));
     for (const { at, sign } of told.centres) {
       const d = 4 * unit, [cx, cy] = at;
-      parts.push(svg("circle", { class: "turning", cx, cy }), svg("path", { class: "sign", d: `M${cx - d} ${cy}h${2 * d}` + (sign > 0 ? `M${cx} ${cy - d}v${2 * d}` : ""), transform: `rotate(${-this.angle} ${cx} ${cy})` }));
+      parts.push(svg("circle", { class: "turning", cx, cy }), svg("path", { class: "sign", d: `M${cx - d} ${cy}h${2 * d}` + (sign > 0 ? `M${cx} ${cy - d}v${2 * d}` : ""), "data-x": cx, "data-y": cy }));
     }
     if (told.flat) parts.push(svg("circle", { class: "flatpoint", cx: told.flat[0], cy: told.flat[1] }));
     group.replaceChildren(...parts);
@@ -43,11 +43,14 @@ export class Mechanics {
       const mark = document.createElement("i");
       mark.style.background = colour;
       return [mark, name + " "];
-    }), told.caption);
+    }), " · " + told.caption);
   }
 
   get angle() { return this.player.motion ? this.player.state(this.player.now).object[2] / RAD : 0; }
 
   /* The picture goes with the object. */
-  follow() { set(find("mechanics"), { transform: find("object").getAttribute("transform") || "" }); }
+  follow() {
+    set(find("mechanics"), { transform: find("object").getAttribute("transform") || "" });
+    for (const sign of document.querySelectorAll("#mechanics .sign")) set(sign, { transform: `rotate(${-this.angle} ${sign.dataset.x} ${sign.dataset.y})` });
+  }
 }
