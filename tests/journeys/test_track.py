@@ -1,7 +1,9 @@
 """flatpush track, as a user runs it."""
 
+import itertools
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from tests.unit.test_control import PERFECT
 
 import flatpush as fp
 from flatpush.cli.app import app
+from flatpush.cli.common import tell_slow_way
 from flatpush.control import Camera, Measurement, SimulatedSensor
 from flatpush.control.loop.closed_loop import drive, limits_used
 from flatpush.control.loop.limits import Limits
@@ -157,6 +160,21 @@ def test_a_push_of_one_sample_is_refused(plan):
     segments = tuple(still if s is push else s for s in plan[0].segments)
     with pytest.raises(fp.InputError, match="has no motion"):
         PlanController.of(replace(plan[0], segments=segments))
+
+
+def test_the_slow_way_is_told_with_the_time_that_it_takes(plan, monkeypatch, capsys):
+    """Feet on one line are not compiled; by a clock on which a step takes half a second."""
+    found, (push,) = plan[0], plan[0].pushes
+    clock = SimpleNamespace(perf_counter=itertools.count(0.0, 0.5).__next__)
+    monkeypatch.setattr("flatpush.cli.common.time", clock)
+    tell_slow_way(found)
+    assert capsys.readouterr().err == ""
+    with pytest.warns(fp.friction.CollinearSupportWarning):
+        feet = fp.Support.points([(-0.02, 0.0), (0.0, 0.0), (0.02, 0.0)], [1.0, 1.0, 1.0])
+    slow = replace(found, scene=replace(found.scene, object=fp.Object(RECTANGLE, feet, friction=0.4)))
+    for asked, steps in (({"runs": 10}, 10 * len(push.times)), ({"rate": 60.0}, 60 * push.times[-1])):
+        tell_slow_way(slow, **asked)
+        assert f"on one line); this takes about {0.5 * steps:.0f} s" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("law", ["path", "dfl", "horizon"])

@@ -89,6 +89,34 @@ def warn_unverified(plan: "Plan") -> None:
         typer.echo(f"warning: this plan fails verification ({names}); see flatpush verify", err=True)
 
 
+def tell_slow_way(plan: "Plan", runs: int = 1, rate: float | None = None) -> None:
+    """Says how long runs of a plan take where the simulator's steps are not compiled, by one step that is measured.
+
+    Args:
+        rate: of a controller [Hz]; None: a step for each sample of the plan.
+    """
+    from ..simulation.plant import Plant
+
+    moving = [push for push in plan.pushes if len(push.times) > 2]
+    if not moving:
+        return
+    push, middle = moving[0], len(moving[0].times) // 2
+    plant = Plant(plan.scene.object, push.fingers, plan.scene.pusher.tip_radius)
+    if plant.compiled:
+        return
+    before, after = push.pusher[middle - 1], push.pusher[middle]
+    state = plant.start(push.object[middle - 1], before)
+    began = time.perf_counter()
+    plant.step(state, after - before, 1.0)
+    each = time.perf_counter() - began
+    steps = sum(len(p.times) if rate is None else p.times[-1] * rate for p in moving)
+    typer.echo(
+        "the simulator knows no quick way for this table (all feet stand on one line);"
+        f" this takes about {runs * steps * each:.0f} s",
+        err=True,
+    )
+
+
 def print_json(value: object) -> None:
     typer.echo(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
 

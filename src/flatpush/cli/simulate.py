@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from .common import error_text, numbers, pose_text, print_json, telling, warn_unverified
+from .common import error_text, numbers, pose_text, print_json, tell_slow_way, telling, warn_unverified
 
 
 def command(
@@ -92,6 +92,8 @@ def command(
     loaded = load_plan(plan)
     check_outputs(plan_files(plan, loaded.run), [output, figure])
     warn_unverified(loaded)
+    if loaded.status == "solved" and model == "exact":
+        tell_slow_way(loaded, runs)
     if figure is not None:
         from ..view.figure import ENDINGS
         from ..view.picture import ENDINGS as PICTURES

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from ..errors import InputError
-from .common import error_text, numbers, pose_text, print_json, warn_unverified
+from .common import error_text, numbers, pose_text, print_json, tell_slow_way, warn_unverified
 
 if TYPE_CHECKING:
     from ..control import ClosedLoopRun, ControllerState
@@ -124,6 +124,7 @@ def command(
         check_outputs(plan_files(plan, loaded.run), [figure])
         check_ending(figure)
     warn_unverified(loaded)
+    tell_slow_way(loaded, rate=rate)
     run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")

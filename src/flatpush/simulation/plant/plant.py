@@ -143,6 +143,11 @@ class Plant:
         self._size = thing.outline.size
         self._runner = Runner(thing.outline, self.surface, self.cof, mu, self.tip_radius, tips, plain)
 
+    @property
+    def compiled(self) -> bool:
+        """Whether its steps can be compiled; if not, it goes the plain way."""
+        return self._runner.compiled
+
     def start(self, object_: ArrayLike, hand: ArrayLike, push_out: bool = True) -> PlantState:
         """The state with the object at X_WO and the hand at X_WE, (3,) or one for each finger (k, 3).
 

@@ -129,6 +129,11 @@ class Runner:
         own = None if self._surface is None else interpreted(self._surface)
         return interpreted(self._outline), plain_rows(self._things[2]), own
 
+    @property
+    def compiled(self) -> bool:
+        """Whether the steps that are compiled know its surface and its number of fingers."""
+        return self._own is not None
+
     def step(self, q: Array, way: Array) -> Done:
         """One run from X_WO q (3,) under hands that go straight between two poses (2, h, 3), the first known.
 
