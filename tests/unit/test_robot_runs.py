@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 from flatpush.experiments import experiment
-from flatpush.experiments.robot_runs import OFF, STARTS, Case, cases, draw, half_widths, plans, table
+from flatpush.experiments.robot_runs import (
+    OFF,
+    PRINTED,
+    STARTS,
+    Case,
+    cases,
+    draw,
+    half_widths,
+    plans,
+    recorded,
+    table,
+)
 from flatpush.geometry import pose_error
 
 
@@ -64,3 +75,22 @@ def test_a_case_ends_at_the_goal_and_is_drawn(tmp_path):
 def test_the_figures_are_experiments():
     for name in STARTS:
         assert callable(experiment(name, runs=1))
+
+
+def test_the_papers_values_and_its_recorded_runs_stand_beside_ours(data_folder):
+    both = plans("fig8", STARTS["fig8"][1])
+    case = Case(
+        both, np.zeros((2, 3)), np.array([[0.001, 0.0, 0.0], [0.003, 0.0, 0.0]]), ("done", "done"), 2.0, 1.0
+    )
+    runs = recorded(data_folder, "fig8")
+    text = table("fig8", [case, case], runs).splitlines()
+    printed = [line for line in text if "as the paper prints" in line]
+    assert "-0.69 ± 0.17" in printed[1]
+    assert "+4.40 ± 1.24" in printed[1]
+    # The paper's means are those of its runs: within rounding, whatever the sense of the axes.
+    for figure in STARTS:
+        for start, errors in recorded(data_folder, figure).items():
+            means = [mean for mean, _ in PRINTED[figure][STARTS[figure].index(start)]]
+            assert np.allclose(np.abs(errors.mean(axis=0)), np.abs(means), atol=0.011)
+    told = [line for line in text if "its recorded runs" in line]
+    assert "4.40°" in told[1]

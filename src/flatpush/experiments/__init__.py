@@ -69,13 +69,15 @@ def experiment(
         raise InputError(f"the experiment {name!r} takes no range of seeds", hint="Leave --seeds out.")
     if name in SEEDED:
         return run if seeds is None else partial(run, seeds=_range(seeds))
+    folder = data if data is not None else os.environ.get("FLATPUSH_DATA")
+    if name in TOGETHER and folder and Path(folder).is_dir():
+        run = partial(run, data=Path(folder))
     if name in RANDOM:
         return partial(run, runs=runs, seed=seed)
     if runs is not None or seed is not None:
         raise InputError(f"the experiment {name!r} has no random runs", hint="Leave --runs and --seed out.")
     if name not in RECORDED:
         return run
-    folder = data if data is not None else os.environ.get("FLATPUSH_DATA")
     if not folder or not Path(folder).is_dir():
         raise InputError(
             f"the experiment {name!r} reads recorded data",

@@ -6,6 +6,7 @@ the last push goes straight to the goal, where late contact costs nothing, and w
 right angles to that one. Support and outline are as stated for the paper's objects; the feet of Fig. 6 are not known.
 """
 
+import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,29 @@ STARTS: dict[str, tuple[tuple[float, float, float], ...]] = {
     "fig7": ((20, -30, 90), (30, 50, 60), (60, 20, 150)),
     "fig8": ((-30, 10, 90), (20, -10, 30), (60, 20, 135)),
     "fig9": ((0, 0, 90), (30, 50, 45), (-50, 20, 180)),
+}
+# What the paper prints for them: means of x, y [mm] and θ [°], signed, and halves of their 95 % intervals.
+PRINTED: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {
+    "fig6": (
+        ((0.03, 0.02), (-3.19, 0.29), (0.53, 0.11)),
+        ((0.50, 0.13), (-0.96, 0.6), (-0.48, 0.61)),
+        ((-0.23, 0.11), (-4.17, 0.87), (-1.29, 0.5)),
+    ),
+    "fig7": (
+        ((-0.26, 0.12), (-3.31, 0.75), (-0.46, 0.19)),
+        ((0.42, 0.12), (-1.49, 1.63), (-0.14, 0.27)),
+        ((-0.27, 0.21), (-4.56, 0.43), (-0.93, 0.76)),
+    ),
+    "fig8": (
+        ((-0.96, 0.08), (-0.09, 0.73), (0.83, 1.00)),
+        ((-0.69, 0.17), (-1.46, 0.06), (4.40, 1.24)),
+        ((-0.65, 0.17), (-1.38, 0.07), (5.89, 2.37)),
+    ),
+    "fig9": (
+        ((0.64, 0.05), (1.04, 0.63), (0.11, 0.31)),
+        ((0.11, 0.65), (-0.50, 0.30), (-0.42, 0.44)),
+        ((2.34, 0.23), (0.12, 0.06), (-1.06, 0.42)),
+    ),
 }
 SWITCH = {"fig6": 0.03, "fig7": 0.03, "fig8": 0.05, "fig9": 0.01}
 COLOURS = ("#cc3311", "#882255", "#4477aa")  # the starts, as in the paper: red, purple, blue
@@ -117,31 +141,53 @@ def cases(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[Case]:
 
 
 def run(
-    folder: Path | None = None, figure: str = "fig6", runs: int | None = None, seed: int | None = None
+    folder: Path | None = None,
+    figure: str = "fig6",
+    runs: int | None = None,
+    seed: int | None = None,
+    data: Path | None = None,
 ) -> str:
-    """The table, and with a folder a figure in it."""
+    """The table, with the recorded runs beside ours where their folder is given, and with a folder a figure in it."""
     found = list(cases(figure, runs or RUNS, SEED if seed is None else seed))
     if folder is not None:
         draw(figure, found, folder / f"{figure}.svg")
-    return table(figure, found)
+    return table(figure, found, recorded(data, figure) if data is not None else {})
 
 
-def table(figure: str, found: list[Case]) -> str:
-    """Signed means with 95 % intervals as the paper prints them, and mean distance and angle off the goal."""
+def recorded(data: Path, figure: str) -> dict[tuple[float, ...], Array]:
+    """Errors (x, y, θ) [mm, °] of the paper's recorded runs, shape (n, 3), by their start (mm, mm, °)."""
+    path = data / "robot_exp_logs" / "summary_runs.csv"
+    if not path.is_file():
+        return {}
+    found: dict[tuple[float, ...], list[list[float]]] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            if row["figure"].lower() == figure:
+                start = tuple(float(row[f"nominal_{name}"]) for name in ("dx_mm", "dy_mm", "dtheta_deg"))
+                found.setdefault(start, []).append(
+                    [float(row[f"err_{name}"]) for name in ("x_mm", "y_mm", "theta_deg")]
+                )
+    return {start: np.array(errors) for start, errors in found.items()}
+
+
+def table(figure: str, found: list[Case], robot: dict[tuple[float, ...], Array] | None = None) -> str:
+    """Signed means with 95 % intervals as the paper prints them, and mean distance and angle off the goal.
+
+    Below each case stands what the paper prints for it, and its robot's recorded runs where they are given.
+    """
     name = found[0].plans[0].scene.object.name
     lines = [
         f"{figure}: {name}, two fingers open loop in the physics cell; x, y [mm], θ [°]: mean ± 95 % interval.",
         f"{'start':<18}{'pushes':<34}{'runs':>5}{'x':>15}{'y':>15}{'θ':>15}{'off':>10}{'':>9}{'worst':>9}{'':>9}",
     ]
-    for start, case in zip(STARTS[figure], found, strict=False):
-        e = case.errors * [1000, 1000, 180 / np.pi]
-        cells = [f"{m:+.2f} ± {h:.2f}" for m, h in zip(e.mean(axis=0), half_widths(e), strict=True)]
-        far, turn = np.hypot(e[:, 0], e[:, 1]), np.abs(e[:, 2])
-        lines.append(
-            f"{', '.join(f'{v:g}' for v in start):<18}{' - '.join(case.pushes):<34}{len(e):>5}"
-            f"{cells[0]:>15}{cells[1]:>15}{cells[2]:>15}"
-            f"{far.mean():>7.2f} mm{turn.mean():>8.2f}°{far.max():>6.2f} mm{turn.max():>8.2f}°"
-        )
+    for start, case, printed in zip(STARTS[figure], found, PRINTED[figure], strict=False):
+        name = ", ".join(f"{v:g}" for v in start)
+        lines.append(_row(name, " - ".join(case.pushes), case.errors * [1000, 1000, 180 / np.pi]))
+        cells = "".join(f"{f'{m:+.2f} ± {h:.2f}':>15}" for m, h in printed)
+        lines.append(f"{'':<18}{'  as the paper prints':<34}{5:>5}{cells}")
+        errors = (robot or {}).get(tuple(float(v) for v in start))
+        if errors is not None:
+            lines.append(_row("", "  its recorded runs", errors))
         stopped = [outcome for outcome in case.outcomes if outcome != DONE]
         lines += [f"  ended: {outcome}" for outcome in stopped]
     e = np.concatenate([case.errors for case in found]) * [1000, 1000, 180 / np.pi]
@@ -151,6 +197,16 @@ def table(figure: str, found: list[Case]) -> str:
         f" average; starts off by {1000 * OFF[0]:g} mm and {np.degrees(OFF[1]):.1f}° (sd); {speed:.1f} times real time"
     )
     return "\n".join(lines)
+
+
+def _row(start: str, what: str, e: Array) -> str:
+    """Of errors in mm and degrees, shape (n, 3)."""
+    cells = "".join(
+        f"{f'{m:+.2f} ± {h:.2f}':>15}" for m, h in zip(e.mean(axis=0), half_widths(e), strict=True)
+    )
+    far, turn = np.hypot(e[:, 0], e[:, 1]), np.abs(e[:, 2])
+    ends = f"{far.mean():>7.2f} mm{turn.mean():>8.2f}°{far.max():>6.2f} mm{turn.max():>8.2f}°"
+    return f"{start:<18}{what:<34}{len(e):>5}{cells}{ends}"
 
 
 def half_widths(values: Array) -> Array:
