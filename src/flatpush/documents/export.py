@@ -67,7 +67,8 @@ def export_rapid(
 
     The poses stand in a work object, whose frame is the base frame; the tool, whose z points down and whose x goes
     along the push, is to be filled in. Every move takes the time that the plan has for it; within a move the controller
-    accelerates as it likes, which a push does not notice. Arguments and errors are those of export_csv.
+    accelerates as it likes, which a push does not notice. Arguments and errors are those of export_csv: base_frame is
+    the pose of the table in the robot's base (x, y, z, yaw) [m, rad].
 
     Returns:
         The number of moves.

@@ -29,7 +29,7 @@ class Address:
     """NAME, or NAME://HOST:PORT, and ?KEY=VALUE&…; lengths in mm and angles in degrees.
 
     Attributes:
-        text: the whole. name, host, port: its parts; "" and None where there is none.
+        text: the whole. name, host: its parts, "" where there is none. port: the number of one, or None.
         base: pose of the table in the robot's base frame (x, y, z, yaw) [m, rad].
         options: what follows the question mark.
     """
@@ -44,7 +44,7 @@ class Address:
 
     @classmethod
     def parse(cls, text: str, base: Sequence[float] | None = None) -> "Address":
-        """Reads an address.
+        """Reads an address; base: pose of the table in the robot's base frame (x, y, z, yaw) [m, rad].
 
         Raises:
             InputError: for what is none.
@@ -65,7 +65,7 @@ class Address:
         return cls(text, parts.scheme, parts.hostname or "", port, where, options)  # type: ignore[arg-type]
 
     def numbers(self, key: str, count: int, default: Sequence[float]) -> list[float]:
-        """The numbers of an option.
+        """The numbers of an option, shape (count,), in the unit of the option; the default where it is not given.
 
         Raises:
             InputError: for other than so many finite numbers.

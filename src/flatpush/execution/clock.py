@@ -13,7 +13,7 @@ class Clock(Protocol):
         ...
 
     def wait(self, until: float) -> None:
-        """Comes back at a time or later; at once if it has passed."""
+        """Comes back at the time `until` [s] or later; at once if it has passed."""
         ...
 
 
@@ -21,9 +21,11 @@ class WallClock:
     """The machine's."""
 
     def now(self) -> float:
+        """The time [s]."""
         return time.monotonic()
 
     def wait(self, until: float) -> None:
+        """Sleeps until a time [s]."""
         left = until - time.monotonic()
         if left > 0:
             time.sleep(left)
@@ -40,9 +42,11 @@ class SimulatedClock:
         self._advance, self._time = advance, 0.0
 
     def now(self) -> float:
+        """The time [s] since the simulation began."""
         return self._time
 
     def wait(self, until: float) -> None:
+        """Moves the simulation on until a time [s]."""
         if until > self._time:
             self._advance(until)
             self._time = until

@@ -84,7 +84,8 @@ class Limits:
         acceleration: float = math.inf,
         turn_rate: float = math.inf,
     ) -> "Limits":
-        """The same, where they are tighter than others."""
+        """The tighter of these limits and others: workspace and heights [m], speed [m/s], acceleration [m/s²] and
+        turn_rate [rad/s], in W, as the attributes of the same names."""
         a, b = self.workspace, workspace or self.workspace
         low, high = heights or self.heights
         return replace(
@@ -139,7 +140,7 @@ class Target:
     """Where the tool shall be at a time, and how fast it goes there: pose and twist as in State.
 
     Attributes:
-        time: on the clock of the run [s].
+        time: on the clock of the run [s]. pose: shape (4,) [m, m, m, rad]. twist: shape (4,) [m/s, m/s, m/s, rad/s].
     """
 
     time: float

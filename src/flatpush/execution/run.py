@@ -74,7 +74,7 @@ class Run:
     Attributes:
         outcome: "done" (open loop), "arrived" (a controller), or why it stopped.
         cycles: every cycle in which something was sent.
-        notes: what a controller said, each once, with the time when it first did.
+        notes: what a controller said, each once, with the time when it first did [s].
     """
 
     outcome: str

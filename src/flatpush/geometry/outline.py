@@ -87,7 +87,7 @@ class Outline:
 
     @classmethod
     def circle(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Outline":
-        """A circle of the given radius [m]."""
+        """A circle of the given radius [m] about a centre, shape (2,) in O [m]."""
         if not (is_finite(radius) and radius > 0):
             raise InputError("the radius of a circle is positive and finite", value=radius)
         middle = vector(centre, 2, "the centre of a circle is a point [x, y] of finite numbers")

@@ -46,14 +46,14 @@ def transform(X_AB: ArrayLike, points_B: ArrayLike) -> Array:
 
 
 def compose(X_AB: ArrayLike, X_BC: ArrayLike) -> Array:
-    """X_AC = X_AB · X_BC. Angles are added, not wrapped: a path keeps its full turns."""
+    """X_AC = X_AB · X_BC, all (..., 3) [m, m, rad]. Angles are added, not wrapped: a path keeps its full turns."""
     A, B = np.asarray(X_AB, dtype=float), np.asarray(X_BC, dtype=float)
     xy = A[..., :2] + rotate(A[..., 2], B[..., :2])
     return np.concatenate([xy, (A[..., 2] + B[..., 2])[..., None]], axis=-1)
 
 
 def inverse(X_AB: ArrayLike) -> Array:
-    """X_BA."""
+    """X_BA of X_AB, both (..., 3) [m, m, rad]."""
     X = np.asarray(X_AB, dtype=float)
     return np.concatenate([-rotate(-X[..., 2], X[..., :2]), -X[..., 2:]], axis=-1)
 

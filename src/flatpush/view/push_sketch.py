@@ -23,7 +23,7 @@ class PushSketch:
         contact_points: on the outline, shape (k, 2), one or two.
         normal: inward, of the (virtual) contact, which is the middle of the contact points; shape (2,).
         fingertips: centres, shape (k, 2).
-        tip_radius: of a fingertip.
+        tip_radius: of a fingertip [m].
         friction: Coulomb coefficient, for the caption.
         cof: centre of friction, shape (2,).
         force_left, force_right: edges of the friction cone, shape (2,).
