@@ -148,9 +148,8 @@ def _clock(segment: Segment, label: str) -> Finding:
 
 
 def _starts(segment: PushSegment, pose: Array, label: str) -> Iterator[Finding]:
-    error = np.abs(
-        segment.object[0] - pose
-    )  # the angle as it stands: the object makes no turn between pushes
+    # The angle as it stands: the object makes no turn between pushes.
+    error = np.abs(segment.object[0] - pose)
     where = f"{label}, sample 0"
     yield Finding(
         "push starts beside where the object is", MM * float(np.hypot(*error[:2])), MM * SAME, "mm", where
