@@ -10,9 +10,9 @@ COMMANDS = get_command(app).commands
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_argument_and_option_is_told(name):
-    for parameter in COMMANDS[name].params:
-        if parameter.name == "help":
-            continue
+    told_of = [parameter for parameter in COMMANDS[name].params if parameter.name != "help"]
+    assert told_of
+    for parameter in told_of:
         told = parameter.help or ""
         assert told.endswith("."), f"{name} {parameter.name}: {told!r}"
         assert not told.startswith(("Of ", "In ")), f"{name} {parameter.name}: {told!r}"
