@@ -3,8 +3,8 @@
     python benchmarks/sliding.py [N] [--noise]
 
 N random queries (default 50) of each object, starts up to 200 mm from the goal at any heading. Each plan is rolled
-out in the plant as a whole, every push from where the last one left the object. With --noise the table and the pose
-seen are not what the planner believes, and it plans again after each push.
+out in the plant as a whole, every push from where the last one left the object. With --noise fingers have a friction
+that the planner does not know, the pose is seen with noise, and it plans again after each push.
 """
 
 import sys
@@ -24,7 +24,6 @@ NEAR, NEAR_ANGLE = 1e-3, np.deg2rad(1.0)
 LOOKS = 12  # pushes under noise
 SEEN = np.array([2e-4, 2e-4, np.deg2rad(0.2)])  # standard deviation of the pose seen
 FRICTION = 0.05  # of fingers that are believed to have none
-STRETCH = 0.1  # relative standard deviation of the ellipsoid's moment
 
 
 def objects() -> dict[str, fp.Object]:
