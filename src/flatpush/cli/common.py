@@ -105,7 +105,8 @@ def tell_slow_way(plan: "Plan", runs: int = 1, rate: float | None = None) -> Non
     if plant.compiled:
         return
     before, after = push.pusher[middle - 1], push.pusher[middle]
-    state = plant.start(push.object[middle - 1], before)
+    # The first step loads what the later ones need.
+    state = plant.step(plant.start(push.object[middle - 1], before), after - before, 1.0)
     began = time.perf_counter()
     plant.step(state, after - before, 1.0)
     each = time.perf_counter() - began
