@@ -10,6 +10,7 @@ from hypothesis import settings
 import flatpush as fp
 
 ROOT = Path(__file__).parents[1]
+collect_ignore_glob = ["*_controller.py"]  # programs of their own that tests start
 
 # MuJoCo asks for it when it is first imported, by whichever test; pictures of the cell need no display then.
 os.environ.setdefault("MUJOCO_GL", "egl")

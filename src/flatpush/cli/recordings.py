@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -30,6 +28,8 @@ def read_recordings(
     Raises:
         InputError: for a log or a scene that is none, scenes of different pushers or of one name.
     """
+    import numpy as np
+
     from ..documents import load_robot_log, load_scene
     from ..simulation.calibration import Setup
     from ..simulation.replay import Recording

@@ -153,12 +153,12 @@ class AmongObstacles:
         keeping = f" with {need:.2f} mm of clearance" if need > 0 else ""
         if self.complaint and not search.nodes:
             return self.complaint
-        if search.closed:
-            way = 2000 * widest_way(self.queries[0])
+        way, wide = (2000 * radius for radius in widest_way(self.queries[0]))
+        if search.closed or way < 0.99 * wide:  # over finer cells than the search's own
             room = f"no way is wider than about {way:.1f} mm" if way > 0 else "nothing gets through at all"
             return (
                 f"the object does not fit through from the start to the goal{keeping}.\n"
-                f"{room}, and the object is {2000 * search.disc:.1f} mm wide (the largest disc inside it).\n"
+                f"{room}, and the object is {wide:.1f} mm wide (the largest disc inside it).\n"
                 "A wider gap, less clearance (planning.margin.clearance) or another start or goal would help."
             )
         head = f"no way{keeping} was found"

@@ -54,10 +54,6 @@ class Portfolio:
         return all(search.closed for search in self.searches)
 
     @property
-    def disc(self) -> float:
-        return self.searches[0].disc
-
-    @property
     def direct(self) -> bool:
         return any(search.direct for search in self.searches)
 

@@ -46,7 +46,7 @@ class Search:
         self.nodes = 0
         self.finest = np.inf
         self.chains: list[Chain] = []
-        self.closed, self.disc, self.direct = False, 0.0, False
+        self.closed, self.direct = False, False
         self._seed = seed
         self._moves = MOVES // REPLANNED if query.robust else MOVES
         self._drawn: Lattice | None = None
@@ -104,7 +104,7 @@ class Search:
             self._add(trees.path)
         yield self.best
         reaches = [Reach(self.query)]
-        self.disc, self.closed, self.direct = reaches[0].radius, not reaches[0].open, reaches[0].direct
+        self.closed, self.direct = not reaches[0].open, reaches[0].direct
         if self.closed:
             return
         families = [self._levels(reaches, True)]

@@ -10,8 +10,8 @@ CELLS = 60_000  # of the grid
 HALVINGS = 8
 
 
-def widest_way(query: Query) -> float:
-    """The radius of the largest disc, up to the largest one inside the object, that gets through [m].
+def widest_way(query: Query) -> tuple[float, float]:
+    """Radii of the largest disc that gets through, up to the largest one inside the object, and of that one [m].
 
     With the clearance on either side, from the middle of the object at the start to that at the goal; 0 if none does.
     Over a grid, and half a cell's diagonal too large at most.
@@ -34,4 +34,4 @@ def widest_way(query: Query) -> float:
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if through(middle) else (low, middle)
-    return low
+    return low, largest
