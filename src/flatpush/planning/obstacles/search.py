@@ -34,8 +34,8 @@ class Search:
         work: poses expanded and moves tried so far.
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
-        closed: whether there is provably no path: not even for a disc inside the object, of radius `disc` [m].
-        direct: whether such a disc is known to have a path that is hardly longer than the straight one.
+        closed: whether there is provably no path: not even for the largest disc inside the object.
+        direct: whether that disc is known to have a path that is hardly longer than the straight one.
     """
 
     def __init__(self, query: Query, seed: int) -> None:
