@@ -118,16 +118,20 @@ def test_derivatives_are_those_of_the_plant(family):
 
 @pytest.mark.slow
 def test_an_unknown_face_is_told_from_a_rim():
-    for word, share in (("uniform", 0.0), ("outline", 1.0)):
+    """Places whose line of force passes far from the centre turn widely, and their radii are the least certain."""
+    for word, most in (("uniform", 0.1), ("outline", 0.25)):
         table = Object(CORNERS, support=word, friction=0.3)
         fit = fit_motion(pushed(table), Object(CORNERS, friction=0.4), TIP)
         places = [table.outline.at(edge, along) for edge in range(4) for along in (0.3, 0.5, 0.7)]
-        errors = [turning_radius(fit.thing, at) / turning_radius(table, at) - 1 for at in places]
+        true = np.array([turning_radius(table, at) for at in places])
+        errors = np.array([turning_radius(fit.thing, at) for at in places]) / true - 1
+        wide = true > 2 * table.outline.size
         assert fit.pressure.name == "density"
-        assert np.nanmax(np.abs(errors)) < 0.1, word
+        assert np.nanmax(np.abs(errors[~wide])) < 0.05, word
+        assert np.nanmax(np.abs(errors[wide])) < most, word
         assert fit.thing.friction == pytest.approx(0.3, rel=0.05)
         covariance = table.support.covariance
-        assert np.trace(fit.thing.support.covariance) == pytest.approx(np.trace(covariance), rel=0.05), share
+        assert np.trace(fit.thing.support.covariance) == pytest.approx(np.trace(covariance), rel=0.05), word
 
 
 def test_what_pushes_do_not_tell_is_said_and_stays_as_expected():
