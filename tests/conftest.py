@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 import flatpush as fp
 
@@ -17,6 +17,8 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 
 # The same draws in every run.
 settings.register_profile("same draws", derandomize=True)
+# For tests/mutants.py, which asks only whether a test fails: the failing case need not be made small.
+settings.register_profile("not shrunk", derandomize=True, phases=[Phase.explicit, Phase.generate])
 settings.load_profile("same draws")
 
 

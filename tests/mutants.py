@@ -76,6 +76,7 @@ def survives(entry: dict[str, str], copy: Path, kernels: str) -> str:
         "-q",
         "-p",
         "no:cacheprovider",
+        "--hypothesis-profile=not shrunk",
         *entry["test"].split(),
     ]
     try:
