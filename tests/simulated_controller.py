@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from flatpush.testing import check_robot
+
 
 class SimulatedController:
     """Runs a script of this folder, which says when it is ready, and then answers every line with what it saw."""
@@ -31,3 +33,24 @@ class SimulatedController:
         self.process.wait()
         self.process.stdin.close()
         self.process.stdout.close()
+
+
+def conforms(controller, robot):
+    """How many checks of flatpush.testing a robot passes, with a new controller for each.
+
+    Args:
+        controller: makes a SimulatedController. robot: makes the robot of one.
+    """
+    running = []
+
+    def make():
+        while running:
+            running.pop().__exit__()
+        running.append(controller())
+        return robot(running[-1])
+
+    try:
+        return len(check_robot(make, kill=lambda _: running[-1].process.kill()))
+    finally:
+        while running:
+            running.pop().__exit__()

@@ -3,7 +3,6 @@
 import itertools
 import json
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -19,7 +18,7 @@ import pytest
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
 pytest.importorskip("starlette", reason="the server is in the extra `page`")
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
+pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 COMMAND = [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser"]
@@ -202,25 +201,6 @@ def test_an_address_of_another_machine_is_refused_in_words():
 
 
 # ---- in a browser ----
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    program, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if program is None or driver is None:
-        pytest.skip("no browser: needs chromium and chromedriver (Debian: chromium, chromium-driver)")
-    options = webdriver.ChromeOptions()
-    options.binary_location = program
-    for flag in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    chromium = webdriver.Chrome(options, webdriver.ChromeService(driver))
-    chromium.downloads = tmp_path_factory.mktemp("downloads")
-    chromium.execute_cdp_cmd(
-        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(chromium.downloads)}
-    )
-    yield chromium
-    chromium.quit()
 
 
 @pytest.fixture

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_controller import SimulatedController
+from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
-from flatpush.testing import check_robot
 
 pytest.importorskip("abb_robot_client")
 from flatpush.execution.egm import EgmRobot
@@ -161,18 +160,7 @@ def test_nobody_answers():
 
 @pytest.mark.slow
 def test_it_conforms():
-    controllers = []
-
-    def make():
-        if controllers:
-            controllers.pop().__exit__()
-        controllers.append(Controller())
-        return robot_at(controllers[-1].port, silence=1.0)
-
-    try:
-        assert len(check_robot(make, kill=lambda robot: controllers[-1].process.kill())) == 10
-    finally:
-        controllers.pop().__exit__()
+    assert conforms(Controller, lambda one: robot_at(one.port, silence=1.0)) == 10
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_controller import SimulatedController
+from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
 
 import flatpush as fp
@@ -16,7 +16,6 @@ from flatpush.execution import DONE, RobotFault, Target, open_robot, run
 from flatpush.execution.arms import ARMS
 from flatpush.execution.cell.robot import CellRobot
 from flatpush.execution.simulated import home_of
-from flatpush.testing import check_robot
 
 pytest.importorskip("franky")
 pytest.importorskip("franky_sim")
@@ -96,18 +95,7 @@ def test_a_turned_elbow_is_no_start():
 
 @pytest.mark.slow
 def test_it_conforms():
-    controllers = []
-
-    def make():
-        while controllers:
-            controllers.pop().__exit__()
-        controllers.append(Controller())
-        return robot_at(controllers[-1].host, silence=2.0)
-
-    try:
-        assert len(check_robot(make, kill=lambda robot: controllers[-1].process.kill())) == 10
-    finally:
-        controllers.pop().__exit__()
+    assert conforms(Controller, lambda one: robot_at(one.host, silence=2.0)) == 10
 
 
 @pytest.mark.slow

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_controller import SimulatedController
+from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
-from flatpush.testing import check_robot
 
 pytest.importorskip("rtde_control")
 from flatpush.execution.ur import UrRobot
@@ -145,18 +144,7 @@ def test_its_address(triangle):
 
 @pytest.mark.slow
 def test_it_conforms():
-    controllers = []
-
-    def make():
-        while controllers:
-            controllers.pop().__exit__()
-        controllers.append(Controller("--patience", 0.1))
-        return robot_at(controllers[-1].host, silence=1.0)
-
-    try:
-        assert len(check_robot(make, kill=lambda robot: controllers[-1].process.kill())) == 10
-    finally:
-        controllers.pop().__exit__()
+    assert conforms(lambda: Controller("--patience", 0.1), lambda one: robot_at(one.host, silence=1.0)) == 10
 
 
 @pytest.mark.slow

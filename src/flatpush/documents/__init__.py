@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from .fitted_scene import save_fitted_scene
     from .motion_file import Motion, MotionFile, is_motion_file, load_motions, own_columns
     from .outline_reader import OutlineNote, outline_note
-    from .pairs_file import BadRow, PairsFile, load_pairs
+    from .pairs_file import PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
     from .reading import mapping_of, read_mapping
     from .robot_log import RobotLog, RobotRun, load_robot_log
     from .rollout_file import save_rollouts
+    from .rows import BadRow
     from .runs_file import save_runs
     from .scene_reader import load_scene, parse_scene
     from .scene_writer import scene_document
@@ -67,7 +68,7 @@ __all__ = [
 ]
 
 _HOME = {
-    "BadRow": "pairs_file",
+    "BadRow": "rows",
     "Motion": "motion_file",
     "MotionFile": "motion_file",
     "is_motion_file": "motion_file",

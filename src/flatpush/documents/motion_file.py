@@ -12,9 +12,10 @@ import numpy as np
 from ..errors import InputError, MissingExtra
 from ..geometry.pose import Array, wrap_angle
 from .context import PER_METRE
-from .pairs_file import HEADER, BadRow, csv_lines
+from .pairs_file import HEADER, csv_lines
 from .reading import read_text
 from .robot_log import RAW, load_robot_log
+from .rows import BadRow, Unusable, number, refusal
 
 # What is read, and the names that columns have of themselves.
 ROLES = ("t", "x", "y", "theta", "px", "py")
@@ -23,7 +24,6 @@ MOST_BYTES = 100_000_000
 # A recording ends where rows are missing for so long, or the finger is suddenly elsewhere [s, m].
 GAP, ELSEWHERE = 1.0, 0.009
 TOPICS = ("/flatpush/object", "/flatpush/tool")
-_MOST_NAMED = 5
 _FORMAT = f"It has columns {', '.join(ROLES)}: time, pose of the object, centre of the fingertip."
 
 
@@ -107,18 +107,12 @@ def load_motions(
             kept = rows.setdefault(key, [])
             if kept and values[0] <= kept[-1][1][0]:
                 how = "repeats that" if values[0] == kept[-1][1][0] else "runs back behind that"
-                raise _Unusable(f"its stamp {values[0]:g} {how} of line {kept[-1][0]}")
+                raise Unusable(f"its stamp {values[0]:g} {how} of line {kept[-1][0]}")
             kept.append((line, values))
-        except _Unusable as reason:
+        except Unusable as reason:
             bad.append(BadRow(line, str(reason)))
     if bad and not skip_bad:
-        named = "; ".join(f"line {row.line}: {row.reason}" for row in bad[:_MOST_NAMED])
-        more = f"; and {len(bad) - _MOST_NAMED} more" if len(bad) > _MOST_NAMED else ""
-        raise InputError(
-            f"{len(bad)} row{'s' if len(bad) > 1 else ''} cannot be used: {named}{more}",
-            source=source,
-            hint="Correct the file, or leave such rows out: --skip-bad.",
-        )
+        raise refusal(bad, source, ": --skip-bad")
     motions = [
         part
         for key, found in rows.items()
@@ -162,10 +156,6 @@ def own_columns(text: str) -> dict[str, str]:
             )
         found[role] = name
     return found
-
-
-class _Unusable(Exception):
-    """Why a row is left out."""
 
 
 def _is_number(text: str) -> bool:
@@ -214,19 +204,10 @@ def _places(
 def _values(cells: Sequence[str], places: Sequence[int], width: int) -> list[float] | None:
     """The numbers of a row; None if the object was not seen."""
     if len(cells) != width:
-        raise _Unusable(f"it has {len(cells)} of {width} columns")
+        raise Unusable(f"it has {len(cells)} of {width} columns")
     if all(not cells[k].strip() or cells[k].strip().lower() == "nan" for k in places[1:4]):
         return None
-    values = []
-    for role, k in zip(ROLES, places, strict=True):
-        try:
-            value = float(cells[k])
-        except ValueError:
-            raise _Unusable(f"{role} is not a number ({cells[k].strip()[:20]!r})") from None
-        if not math.isfinite(value):
-            raise _Unusable(f"{role} is not finite ({cells[k].strip()})")
-        values.append(value)
-    return values
+    return [number(cells[k], role) for role, k in zip(ROLES, places, strict=True)]
 
 
 def _parts(name: str, table: Array, lines: np.ndarray) -> list[Motion]:

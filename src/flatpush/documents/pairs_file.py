@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..friction.pairs import Pairs
 from .context import PER_METRE
 from .reading import read_text
+from .rows import BadRow, Unusable, number, refusal
 from .scene_model import LARGEST
 
 # Two ways to name the six numbers: our plain one, and that of the recorded force pushes.
@@ -23,21 +24,7 @@ RECORDED = ("Fx", "Fy", "tau", "dx_body", "dy_body", "dtheta")
 STAMPS = ("t", "time", "stamp")
 GROUPS = ("experiment", "surface", "pressure")
 MOST_BYTES = 100_000_000
-_MOST_NAMED = 5
 HEADER = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:[\[(]([^\])]*)[\])])?\s*")
-
-
-@dataclass(frozen=True)
-class BadRow:
-    """A row that cannot be used.
-
-    Attributes:
-        line: its number in the file, counted from 1.
-        reason: what is wrong.
-    """
-
-    line: int
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +80,12 @@ def load_pairs(
             values = _values(cells, columns)
             if columns.stamp is not None:
                 _rising(cells[columns.stamp], line, name, last)
-        except _Unusable as reason:
+        except Unusable as reason:
             bad.append(BadRow(line, str(reason)))
             continue
         good.setdefault(name, []).append((line, values * factors))
     if bad and not skip_bad:
-        raise _refusal(bad, source)
+        raise refusal(bad, source, " with --skip-bad")
     if not good:
         raise InputError("the file holds no usable pair", source=source, hint=_FORMAT)
     stem = Path(source).stem
@@ -107,10 +94,6 @@ def load_pairs(
 
 
 _FORMAT = f"It has columns {', '.join(PLAIN)} (or {', '.join(RECORDED)}), one pair a row."
-
-
-class _Unusable(Exception):
-    """Why a row is left out."""
 
 
 @dataclass(frozen=True)
@@ -196,26 +179,21 @@ def _factors(columns: _Columns, length: str, angle: str, source: str) -> np.ndar
 
 def _values(cells: Sequence[str], columns: _Columns) -> np.ndarray:
     if len(cells) != columns.width:
-        raise _Unusable(f"it has {len(cells)} of {columns.width} columns")
+        raise Unusable(f"it has {len(cells)} of {columns.width} columns")
     values = np.empty(6)
     for k, (name, place) in enumerate(zip(columns.names, columns.places, strict=True)):
         values[k] = _number(cells[place], name)
     if not np.any(values[:3]):
-        raise _Unusable("the wrench is zero")
+        raise Unusable("the wrench is zero")
     if not np.any(values[3:]):
-        raise _Unusable("the object does not move")
+        raise Unusable("the object does not move")
     return values
 
 
 def _number(cell: str, name: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        raise _Unusable(f"{name} is not a number ({cell.strip()[:20]!r})") from None
-    if not math.isfinite(value):
-        raise _Unusable(f"{name} is not finite ({cell.strip()})")
+    value = number(cell, name)
     if abs(value) > LARGEST:
-        raise _Unusable(f"{name} is beyond {LARGEST:g} ({cell.strip()})")
+        raise Unusable(f"{name} is beyond {LARGEST:g} ({cell.strip()})")
     return value
 
 
@@ -223,23 +201,12 @@ def _rising(cell: str, line: int, name: str, last: dict[str, tuple[float, int]])
     stamp = _number(cell, "the stamp")
     if name in last and stamp <= last[name][0]:
         how = "repeats that" if stamp == last[name][0] else "runs back behind that"
-        raise _Unusable(f"its stamp {cell.strip()} {how} of line {last[name][1]}")
+        raise Unusable(f"its stamp {cell.strip()} {how} of line {last[name][1]}")
     last[name] = (stamp, line)
 
 
 def _experiment(cells: Sequence[str], columns: _Columns) -> str:
     return " ".join(cells[place].strip() for place in columns.groups)
-
-
-def _refusal(bad: Sequence[BadRow], source: str) -> InputError:
-    named = "; ".join(f"line {row.line}: {row.reason}" for row in bad[:_MOST_NAMED])
-    more = f"; and {len(bad) - _MOST_NAMED} more" if len(bad) > _MOST_NAMED else ""
-    count = f"{len(bad)} row{'s' if len(bad) > 1 else ''}"
-    return InputError(
-        f"{count} cannot be used: {named}{more}",
-        source=source,
-        hint="Correct the file, or leave such rows out with --skip-bad.",
-    )
 
 
 def _pairs(name: str, rows: Sequence[tuple[int, np.ndarray]]) -> Pairs:

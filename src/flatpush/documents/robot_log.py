@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,8 +11,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .pairs_file import BadRow
 from .reading import read_text
+from .rows import BadRow, Unusable, number, refusal
 
 # In the order of a raw row; lengths in mm, angles in rad.
 RAW = (
@@ -29,7 +28,6 @@ RAW = (
 GROUPS = ("object", "start_id", "run_id")
 MOST_BYTES = 100_000_000
 MOST_ACTIONS = 1_000_000
-_MOST_NAMED = 5
 _FORMAT = (
     f"A row is {', '.join(RAW)}: raw text of eight numbers, or CSV whose first line names these columns."
 )
@@ -118,23 +116,19 @@ def load_robot_log(path: str | os.PathLike[str], *, skip_bad: bool = False) -> R
             key = tuple(cells[columns[name]].strip() if name in columns else "" for name in GROUPS)
             if key in last and values[0] <= last[key][0]:
                 how = "repeats that" if values[0] == last[key][0] else "runs back behind that"
-                raise _Unusable(f"its stamp {cells[columns['t']].strip()} {how} of line {last[key][1]}")
-        except _Unusable as reason:
+                raise Unusable(f"its stamp {cells[columns['t']].strip()} {how} of line {last[key][1]}")
+        except Unusable as reason:
             bad.append(BadRow(line, str(reason)))
             continue
         last[key] = (values[0], line)
         good.setdefault(key, []).append((line, values))
     if bad and not skip_bad:
-        raise _refusal(bad, source)
+        raise refusal(bad, source, ": load_robot_log(path, skip_bad=True)")
     if not good:
         raise InputError("the log holds no usable row", source=source, hint=_FORMAT)
     stem = Path(source).stem
     runs = tuple(_run(key if any(key) else (stem, "", ""), found) for key, found in good.items())
     return RobotLog(runs, tuple(bad), None if text.endswith(("\n", "\r")) else line)
-
-
-class _Unusable(Exception):
-    """Why a row is left out."""
 
 
 def _rows(text: str, source: str) -> Iterator[tuple[int, list[str]]]:
@@ -166,33 +160,14 @@ def _columns(names: Sequence[str], source: str) -> dict[str, int]:
 def _values(cells: Sequence[str], columns: dict[str, int], width: int) -> list[float]:
     """The eight numbers of a raw row, and whether the object was seen."""
     if len(cells) != width:
-        raise _Unusable(f"it has {len(cells)} of {width} columns")
-    values = []
-    for name in RAW:
-        cell = cells[columns[name]].strip()
-        try:
-            value = float(cell)
-        except ValueError:
-            raise _Unusable(f"{name} is not a number ({cell[:20]!r})") from None
-        if not math.isfinite(value):
-            raise _Unusable(f"{name} is not finite ({cell})")
-        values.append(value)
+        raise Unusable(f"it has {len(cells)} of {width} columns")
+    values = [number(cells[columns[name]], name) for name in RAW]
     if values[-1] != round(values[-1]) or abs(values[-1]) > MOST_ACTIONS:
-        raise _Unusable(f"action_id is not the number of a push ({cells[columns['action_id']].strip()})")
+        raise Unusable(f"action_id is not the number of a push ({cells[columns['action_id']].strip()})")
     lost = cells[columns["vision_lost"]].strip() if "vision_lost" in columns else "0"
     if lost not in ("0", "1"):
-        raise _Unusable(f"vision_lost is neither 0 nor 1 ({lost[:20]!r})")
+        raise Unusable(f"vision_lost is neither 0 nor 1 ({lost[:20]!r})")
     return [*values, float(lost == "0" and any(values[1:4]))]
-
-
-def _refusal(bad: Sequence[BadRow], source: str) -> InputError:
-    named = "; ".join(f"line {row.line}: {row.reason}" for row in bad[:_MOST_NAMED])
-    more = f"; and {len(bad) - _MOST_NAMED} more" if len(bad) > _MOST_NAMED else ""
-    return InputError(
-        f"{len(bad)} row{'s' if len(bad) > 1 else ''} cannot be used: {named}{more}",
-        source=source,
-        hint="Correct the file, or leave such rows out: load_robot_log(path, skip_bad=True).",
-    )
 
 
 def _run(key: tuple[str, ...], rows: Sequence[tuple[int, list[float]]]) -> RobotRun:
