@@ -1,13 +1,17 @@
 """Finds the one outer contour that the curves of a drawing make."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
 from .drawing import FLATNESS, Curve, Drawing, LeftOut, extent
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 _ONE = "Draw the outline as one closed contour"
 _CHOOSE = "or choose it by its layer or id: outline: {file: ..., layer: NAME}."
@@ -62,7 +66,7 @@ def outer_contour(drawing: Drawing, source: str, choice: str = "") -> tuple[Arra
         raise InputError(
             "the drawing has no extent", source=source, hint="Its coordinates are finite numbers."
         )
-    closed, opened = _joined(pieces, source)
+    closed, opened = _filled(*_joined(pieces, source))
     if not closed:
         end = opened[0].points[-1]
         raise InputError(
@@ -84,6 +88,59 @@ def outer_contour(drawing: Drawing, source: str, choice: str = "") -> tuple[Arra
 
 
 _REDRAW = "Redraw the outline without it."
+
+
+def _filled(closed: list[Chain], opened: list[Chain]) -> tuple[list[Chain], list[Chain]]:
+    """The same, with open curves that are painted closed by the straight line between their ends, as SVG paints them.
+
+    Where such curves were joined to a contour, and what is painted goes beyond it, the contour is not what is seen.
+    """
+    from shapely import Polygon
+
+    for k, chain in enumerate(closed):
+        if len(chain.parts) > 1 and any(curve.filled for curve, _ in chain.parts):
+            shape = Polygon(chain.points).buffer(FLATNESS * extent(chain.points))
+            parts = tuple(
+                (replace(c, refusal=c.refusal or _BEYOND) if c.filled and _beyond(c, shape) else c, backwards)
+                for c, backwards in chain.parts
+            )
+            closed[k] = Chain(parts, chain.points)
+    rest = []
+    for chain in opened:
+        ((curve, _),) = chain.parts
+        if not curve.filled or _is_straight(chain.points):
+            rest.append(chain)
+            continue
+        place = f"{curve.place}, closed by a straight line as its fill is"
+        whole = replace(curve, place=place, points=_closing(curve.points))
+        closed.append(Chain(((whole, False),), np.concatenate([chain.points, chain.points[:1]])))
+    return closed, rest
+
+
+_BEYOND = "its fill goes beyond the outline of which it is a part (fill: none would take it away)"
+
+
+def _beyond(curve: Curve, shape: "Polygon") -> bool:
+    """Whether the paint of an open curve reaches out of a shape."""
+    from shapely import LinearRing
+
+    points = _rough(curve)
+    return not _is_straight(points) and not shape.covers(LinearRing(points))
+
+
+def _closing(points: Callable[[float], Array]) -> Callable[[float], Array]:
+    def closed(tolerance: float) -> Array:
+        line = points(tolerance)
+        return np.concatenate([line, line[:1]])
+
+    return closed
+
+
+def _is_straight(points: Array) -> bool:
+    from shapely.geometry import MultiPoint
+
+    hull = MultiPoint(points).convex_hull
+    return bool(hull.area <= _STRAIGHT * hull.length**2)
 
 
 def _left(curve: Curve, reason: str) -> LeftOut:
@@ -264,9 +321,7 @@ def _check_alone(outer: Chain, closed: list[Chain], opened: list[Chain], source:
     apart: dict[str, Array] = {}  # the boxes around the open lines of each layer, as two corners
     for chain in opened:
         line = LineString(chain.points)
-        hull = MultiPoint(chain.points).convex_hull
-        straight = hull.area <= _STRAIGHT * hull.length**2
-        surrounds = not straight and hull.covers(shell)
+        surrounds = not _is_straight(chain.points) and MultiPoint(chain.points).convex_hull.covers(shell)
         if not surrounds and line.intersects(shell):
             continue
         layer = chain.parts[0][0].layer

@@ -24,6 +24,7 @@ class Curve:
         names: all by which it can be chosen: layers and ids.
         aside: why it is no outline by the way it is drawn, as a centre line; empty if it may be one.
         refusal: why it is not what is seen, as where it is clipped; empty if it is.
+        filled: whether what it surrounds is painted, up to the straight line between its ends.
     """
 
     points: Callable[[float], Array]
@@ -32,6 +33,7 @@ class Curve:
     names: tuple[str, ...] = ()
     aside: str = ""
     refusal: str = ""
+    filled: bool = False
 
 
 @dataclass(frozen=True, eq=False)

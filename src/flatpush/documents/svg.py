@@ -125,7 +125,14 @@ class _Reader:
         box = view_box(self.root)
         sides = [number(self.root.attributes.get(key, "")) for key in ("width", "height")]
         viewport = (box[2], box[3]) if box is not None else (sides[0], sides[1])
-        self.visit(self.root, _State(NO_TURN, {}, viewport), page=True)
+        state = _State(NO_TURN, {}, viewport)
+        aspect = self.root.attributes.get("preserveAspectRatio", "")
+        if box is not None and "slice" in aspect.split()[1:] and np.isfinite(sides).all() and min(sides) > 0:
+            # The page is filled, and what of the view box has no room on it is not seen.
+            matrix = fitted(box, sides[0], sides[1], aspect)
+            page = np.array([(0, 0), (sides[0], 0), sides, (0, sides[1])], dtype=float) - matrix[:, 2]
+            state = replace(state, window=(page / np.diag(matrix), "the edge of the page (slice)"))
+        self.visit(self.root, state, page=True)
         real, bare = self.sizes.real, self.sizes.bare
         if real and self.drawing.unit is None:
             if bare:
@@ -339,7 +346,7 @@ class _Reader:
             cut = refusal
             if state.window is not None and not cut and not _within(points, state.window[0] * (1.0, -1.0)):
                 cut = f"it is cut off by {state.window[1]}"
-            self.drawing.curves.append(Curve(points, place, state.layer, state.names, aside, cut))
+            self.drawing.curves.append(Curve(points, place, state.layer, state.names, aside, cut, filled))
             if stroked and not aside:
                 scale = np.sqrt(abs(np.linalg.det(state.matrix[:, :2])))
                 width = scale * _width(style.get("stroke-width", "1"))

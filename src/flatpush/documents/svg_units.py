@@ -61,7 +61,7 @@ def fitted(box: Array, width: float, height: float, aspect: str) -> Array:
     align = words[0] if words else "xMidYMid"
     sx, sy = width / box[2], height / box[3]
     if align != "none":
-        sx = sy = max(sx, sy) if "slice" in words else min(sx, sy)
+        sx = sy = max(sx, sy) if "slice" in words[1:] else min(sx, sy)
     room = np.array([width - sx * box[2], height - sy * box[3]])
     part = np.array(
         [{"xMin": 0.0, "xMax": 1.0}.get(align[:4], 0.5), {"YMin": 0.0, "YMax": 1.0}.get(align[4:], 0.5)]
@@ -181,7 +181,7 @@ def page_unit(root: Element) -> float | None:
     ]
     aspect = root.attributes.get("preserveAspectRatio", "").split()
     if aspect and aspect[0] != "none" and min(scales) > 0:
-        return max(scales) if "slice" in aspect else min(scales)
+        return max(scales) if "slice" in aspect[1:] else min(scales)
     if not (min(scales) > 0 and max(scales) <= 1.001 * min(scales)):
         raise InputError(
             "width, height and viewBox have the same proportions",
