@@ -1,8 +1,9 @@
 """A controller, a sensor and a simulated object in a loop."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from itertools import count, islice
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,9 @@ from ...geometry.pose import Array
 from .controller import AbstractController, ControllerState
 from .limits import Limits
 from .sensor import AbstractSensor
+
+# Where a hand in the air leaves an object alone that is moved meanwhile [m].
+ASIDE = 10.0
 
 
 class World(Protocol):
@@ -77,6 +81,58 @@ class ClosedLoopRun:
     notes: tuple[tuple[float, str], ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Tick(Generic[StateT]):
+    """One tick of the loop: its time [s], X_WO and X_WE, the pusher's height at its end [m], the controller's state,
+    the contact of the first finger, and the outcome or ""."""
+
+    time: float
+    object: Array
+    pusher: Array
+    height: float
+    state: StateT
+    contact: str
+    outcome: str
+
+
+def ticks(
+    controller: AbstractController[StateT],
+    plant: Table[WorldT],
+    start: ArrayLike,
+    hand: ArrayLike,
+    sensor: AbstractSensor,
+    begin: float = 0.0,
+) -> Generator[Tick[StateT], ArrayLike | None, None]:
+    """The loop of drive, tick by tick, until there is an outcome.
+
+    What is sent to it is a pose X_WO to which somebody moves the object after that tick; fingers on the table stay
+    outside of it.
+    """
+    dt = 1 / controller.rate
+    world, state, eyes = plant.start(start, hand), controller.start(begin), sensor.start()
+    lifted: Array | None = None  # X_WE while the hand is in the air
+    for k in count():
+        time = begin + k * dt
+        at = world.hand if lifted is None else lifted
+        eyes = sensor.expose(eyes, time, world.object, at)
+        eyes, frames = sensor.arrived(eyes, time)
+        state, command = controller.step(state, frames[-1] if frames else None, time)
+        contact = world.modes[0] if lifted is None else "separation"
+        outcome = state.outcome or world.outcome
+        moved = yield Tick(time, world.object, at, command.height, state, contact, outcome)
+        if outcome:
+            return
+        if moved is not None:
+            there = np.asarray(moved, dtype=float)
+            world = plant.start(there, at if lifted is None else there + np.array([ASIDE, 0.0, 0.0]))
+        if command.height > 0:
+            lifted = np.asarray(at, dtype=float) + dt * command.velocity
+        else:
+            if lifted is not None:
+                world, lifted = plant.start(world.object, lifted), None
+            world = plant.step(world, command.velocity, dt)
+
+
 def drive(
     controller: AbstractController[StateT],
     plant: Table[WorldT],
@@ -97,48 +153,28 @@ def drive(
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError("a duration is positive and finite", key="duration", value=duration)
-    dt = 1 / controller.rate
-    world, state, eyes = plant.start(start, hand), controller.start(begin), sensor.start()
-    times, objects, hands, heights, modes, contacts = [], [], [], [], [], []
+    most = int(np.ceil(duration * controller.rate)) + 1
+    made: list[Tick[StateT]] = []
     notes: dict[str, float] = {}
-    outcome = ""
-    lifted: Array | None = None  # X_WE while the hand is in the air
-    for k in range(int(np.ceil(duration * controller.rate)) + 1):
-        time = begin + k * dt
-        at = world.hand if lifted is None else lifted
-        eyes = sensor.expose(eyes, time, world.object, at)
-        eyes, frames = sensor.arrived(eyes, time)
-        state, command = controller.step(state, frames[-1] if frames else None, time)
-        times.append(time)
-        objects.append(world.object)
-        hands.append(at)
-        heights.append(command.height)
-        modes.append(state.mode)
-        contacts.append(world.modes[0] if lifted is None else "separation")
-        if state.note:
-            notes.setdefault(state.note, time)
+    for tick in islice(ticks(controller, plant, start, hand, sensor, begin), most):
+        made.append(tick)
+        if tick.state.note:
+            notes.setdefault(tick.state.note, tick.time)
         if told is not None:
-            told(time, state)
-        if state.outcome or world.outcome:
-            outcome = state.outcome or world.outcome
-            break
-        if command.height > 0:
-            lifted = np.asarray(at, dtype=float) + dt * command.velocity
-        else:
-            if lifted is not None:
-                world, lifted = plant.start(world.object, lifted), None
-            world = plant.step(world, command.velocity, dt)
+            told(tick.time, tick.state)
+    last = made[-1].state
+    outcome = made[-1].outcome
     if not outcome:
-        why = f": {state.note}" if state.note else ""
-        outcome = f"out of time after {duration:.1f} s, {state.mode}{why}"
+        why = f": {last.note}" if last.note else ""
+        outcome = f"out of time after {duration:.1f} s, {last.mode}{why}"
     said = tuple((t, text) for text, t in notes.items())
     return ClosedLoopRun(
-        np.array(times),
-        np.array(objects),
-        np.array(hands),
-        np.array(heights),
-        tuple(modes),
-        tuple(contacts),
+        np.array([tick.time for tick in made]),
+        np.array([tick.object for tick in made]),
+        np.array([tick.pusher for tick in made]),
+        np.array([tick.height for tick in made]),
+        tuple(tick.state.mode for tick in made),
+        tuple(tick.contact for tick in made),
         outcome,
         said,
     )

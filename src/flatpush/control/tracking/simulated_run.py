@@ -9,6 +9,7 @@ from shapely import MultiPoint, Point
 
 from ...errors import InputError
 from ...geometry import compose
+from ...geometry.pose import Array
 from ...problem import Plan
 from ...simulation.plant import Plant
 from ..horizon.controller import HorizonController
@@ -20,6 +21,7 @@ from .plan_controller import BESIDE, PlanController, beside, check_pushes, goal_
 
 Law = Literal["path", "dfl", "horizon"]
 Timing = Literal["even", "plan"]
+Parts = tuple[AbstractController, Plant, Array, Array, SimulatedSensor]
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,24 @@ class TrackedRun:
         Raises:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
+        run = drive(*self.parts(plan), self.patience(plan), told=told)
+        return replace(run, outcome=self.judged(plan, run.outcome, run.object[-1]))
+
+    def judged(self, plan: Plan, outcome: str, pose: Array) -> str:
+        """The outcome of a run that ended with the object at X_WO: what the controller saw is one thing, where the
+        object is another."""
+        if outcome != ARRIVED and not outcome.startswith(BESIDE):
+            return outcome
+        (distance, turn), within = goal_error(plan, pose), self._within(plan)
+        inside = distance <= within[0] and turn <= within[1]
+        return ARRIVED if inside else beside(distance, turn)
+
+    def patience(self, plan: Plan) -> float:
+        """How long it may take [s]. The horizon controller looks, and lands again, as often as it takes."""
+        return 3 * plan.duration + (200 if self.controller == "horizon" else 10)
+
+    def parts(self, plan: Plan) -> Parts:
+        """The controller, the plant, X_WO and X_WE at the start, and the sensor; errors as of `of`."""
         check_pushes(plan)
         law = self.law(plan)
         scene, first = plan.scene, plan.pushes[0]
@@ -65,19 +85,10 @@ class TrackedRun:
         if not MultiPoint(scene.object.outline.polyline()).convex_hull.covers(Point(cof)):
             raise InputError("the centre of friction is off the object", key="centre", value=self.centre)
         plant = Plant(scene.object, first.fingers, scene.pusher.tip_radius, friction=self.friction, cof=cof)
-        # The horizon controller looks, and lands again, as often as it takes.
-        patience = 3 * plan.duration + (200 if self.controller == "horizon" else 10)
         # The pusher waits twice the approach distance behind the first contact, as planned.
         hand = compose(first.pusher[0], [-2 * scene.pusher.approach, 0.0, 0.0])
-        sensor = SimulatedSensor(self.camera, np.random.default_rng(self.seed))
         begin = scene.start_pose + np.array(self.start)
-        run = drive(law, plant, begin, hand, sensor, patience, told=told)
-        # What the controller saw is one thing; here is known where the object is.
-        if run.outcome != ARRIVED and not run.outcome.startswith(BESIDE):
-            return run
-        (distance, turn), within = goal_error(plan, run.object[-1]), self._within(plan)
-        inside = distance <= within[0] and turn <= within[1]
-        return replace(run, outcome=ARRIVED if inside else beside(distance, turn))
+        return law, plant, begin, hand, SimulatedSensor(self.camera, np.random.default_rng(self.seed))
 
     def _within(self, plan: Plan) -> tuple[float, float]:
         goal = plan.scene.planning.goal_tolerance
