@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from tests.command_line import flatpush
 
-from flatpush.cli.app import main
 from flatpush.documents.calibration_file import CalibrationFile, load_calibration, save_calibration
 from flatpush.errors import InputError
 from flatpush.geometry import compose, inverse
@@ -76,25 +76,14 @@ def logs(folder, lag=0.1):
     return files
 
 
-@pytest.fixture
-def flatpush(monkeypatch, capsys):
-    def call(*arguments):
-        monkeypatch.setattr("sys.argv", ["flatpush", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return int(ended.value.code or 0), *capsys.readouterr()
-
-    return call
-
-
 @pytest.mark.slow
-def test_two_commands_from_logs_to_predictions(tmp_path, flatpush):
+def test_two_commands_from_logs_to_predictions(tmp_path):
     """Starts left out are predicted far better than without the calibration, and the lag is found."""
     (log,) = logs(tmp_path)
     scene, target = tmp_path / "scene.yaml", tmp_path / "calibration.json"
-    status, out, err = flatpush("calibrate", log, "--scene", scene, "-o", target, "--json")
-    assert status == 0, err
-    told = json.loads(out)
+    ended = flatpush("calibrate", log, "--scene", scene, "-o", target, "--json")
+    assert ended.returncode == 0, ended.stderr
+    told = json.loads(ended.stdout)
     assert told["runs"] == 6
     assert told["starts"] == 3
     left = np.array(told["left_out"])
@@ -103,10 +92,10 @@ def test_two_commands_from_logs_to_predictions(tmp_path, flatpush):
     kept = load_calibration(target)
     assert kept.judged[:2] == pytest.approx([left[:, 0].mean(), left[:, 0].max()])
     assert kept.lag == pytest.approx(0.1, abs=0.02)
-    before = json.loads(flatpush("replay", log, "--scene", scene, "--json")[1])
+    before = json.loads(flatpush("replay", log, "--scene", scene, "--json").stdout)
     table, figure = tmp_path / "runs-out.csv", tmp_path / "runs.svg"
     with_it = ("replay", log, "--scene", scene, "--calibration", target)
-    after = json.loads(flatpush(*with_it, "-o", table, "--figure", figure, "--json")[1])
+    after = json.loads(flatpush(*with_it, "-o", table, "--figure", figure, "--json").stdout)
     uncorrected, corrected = (np.mean([one["final"][0] for one in runs]) for runs in (before, after))
     assert uncorrected > 8e-4
     assert corrected < 0.35 * uncorrected
@@ -143,20 +132,20 @@ def test_a_calibration_is_kept_as_it_is(tmp_path):
         load_calibration(tmp_path / "c.json")
 
 
-def test_what_does_not_belong_together_is_refused(tmp_path, flatpush):
+def test_what_does_not_belong_together_is_refused(tmp_path):
     (log,) = logs(tmp_path)
     scene = tmp_path / "scene.yaml"
     text = log.read_text()
     other = tmp_path / "other.yaml"
     other.write_text(SCENE.replace("name: block", "name: disc").replace("spacing: 18", "spacing: 20"))
-    assert "same pusher" in flatpush("calibrate", log, "--scene", scene, "--scene", other)[2]
+    assert "same pusher" in flatpush("calibrate", log, "--scene", scene, "--scene", other).stderr
     log.write_text(text.replace("block,c", "disc,c"))
-    assert "no scene describes" in flatpush("replay", log, "--scene", scene)[2]
+    assert "no scene describes" in flatpush("replay", log, "--scene", scene).stderr
     log.write_text(text)
-    assert "OBJECT=TAG" in flatpush("calibrate", log, "--scene", scene, "--tag", "block")[2]
+    assert "OBJECT=TAG" in flatpush("calibrate", log, "--scene", scene, "--tag", "block").stderr
     kept = CalibrationFile(np.zeros(6), np.zeros(2), {"cup": np.zeros(3)}, {}, 0.0, 0.5, 0.0, np.empty(0), 1)
     save_calibration(kept, tmp_path / "c.json")
-    status, _, err = flatpush("replay", log, "--scene", scene, "--calibration", tmp_path / "c.json")
-    assert status == 2
-    assert "holds no tag of this object" in err
-    assert "Traceback" not in err
+    ended = flatpush("replay", log, "--scene", scene, "--calibration", tmp_path / "c.json")
+    assert ended.returncode == 2
+    assert "holds no tag of this object" in ended.stderr
+    assert "Traceback" not in ended.stderr

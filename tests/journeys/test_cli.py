@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.command_line import flatpush
 
 import flatpush as fp
-from flatpush.cli import main
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.yaml"))
@@ -24,11 +24,6 @@ pusher: {fingers: 2, spacing: 18, tip_radius: 2.5}
 start: [20, -50, 15]
 goal: [0, 0, 0]
 """
-
-
-def flatpush(*arguments, folder, **options) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "flatpush", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, **options)
 
 
 # What a shell starts in the background ignores Ctrl-C, and so would its children.
@@ -173,19 +168,15 @@ def test_already_there_is_an_empty_plan(folder):
         (("experiment", "fig99"), "no such experiment"),
     ],
 )
-def test_bad_usage_is_one_message_and_status_2(folder, monkeypatch, capsys, arguments, words):
-    monkeypatch.chdir(folder)
-    monkeypatch.setattr(sys, "argv", ["flatpush", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    errors = capsys.readouterr().err
-    assert re.search(words, errors)
-    assert "Traceback" not in errors
+def test_bad_usage_is_one_message_and_status_2(folder, arguments, words):
+    ended = flatpush(*arguments, folder=folder)
+    assert ended.returncode == 2
+    assert re.search(words, ended.stderr)
+    assert "Traceback" not in ended.stderr
     assert sorted(p.name for p in folder.iterdir()) == ["scene.yaml"]
 
 
-def test_nothing_takes_the_place_of_what_a_plan_was_read_from(folder, monkeypatch, capsys):
+def test_nothing_takes_the_place_of_what_a_plan_was_read_from(folder, monkeypatch):
     """Of a plan in another folder, which says where its scene and the drawing in it are."""
     monkeypatch.chdir(folder)
     Path("part.svg").write_text(
@@ -197,13 +188,7 @@ def test_nothing_takes_the_place_of_what_a_plan_was_read_from(folder, monkeypatc
     Path("plans").mkdir()
     before = {name: Path(name).read_text() for name in ("scene.yaml", "part.svg")}
 
-    def status(*arguments):
-        monkeypatch.setattr(sys, "argv", ["flatpush", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return ended.value.code, capsys.readouterr().err
-
-    assert status("plan", "scene.yaml", "-o", "plans/plan.json")[0] == 0
+    assert flatpush("plan", "scene.yaml", "-o", "plans/plan.json").returncode == 0
     for arguments, what in (
         (("plan", "scene.yaml", "-o", "same.svg", "--figure", "same.svg"), "another output"),
         (("plan", "scene.yaml", "-o", "part.svg"), "an input"),
@@ -213,8 +198,8 @@ def test_nothing_takes_the_place_of_what_a_plan_was_read_from(folder, monkeypatc
         (("export", "plans/plan.json", "robot.csv"), "an input"),
         (("run", "plans/plan.json", "--robot", "sim", "--figure", "part.svg"), "an input"),
     ):
-        code, said = status(*arguments)
-        assert (code, f"this file is {what}" in said) == (2, True), (arguments, said)
+        ended = flatpush(*arguments)
+        assert (ended.returncode, f"this file is {what}" in ended.stderr) == (2, True), ended
     assert before == {name: Path(name).read_text() for name in before}
     assert not Path("same.svg").exists()
 
@@ -267,7 +252,9 @@ def test_every_example_plans_and_verifies(example, tmp_path):
 
 
 def test_help_and_version(tmp_path):
-    shown = flatpush("--help", folder=tmp_path)
+    """In a process of its own, as a user starts it."""
+    started = [sys.executable, "-m", "flatpush", "--help"]
+    shown = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     for command in ("plan", "verify", "simulate", "describe", "export", "init", "experiment"):
         assert command in shown.stdout
     assert "flatpush 0.1.0" in flatpush("--version", folder=tmp_path).stdout

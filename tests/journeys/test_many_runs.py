@@ -6,12 +6,7 @@ import subprocess
 import sys
 
 import pytest
-
-
-def flatpush(*words: object, patience: float = 240) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "flatpush", *map(str, words)], capture_output=True, text=True, timeout=patience
-    )
+from tests.command_line import flatpush
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +40,14 @@ def test_the_report_tells_where_the_object_ends(plan, tmp_path):
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_numbers_as_one_process(plan):
     alone = flatpush("simulate", plan, "--runs", 120, "--seed", 7, "--json")
-    spread = flatpush("simulate", plan, "--runs", 120, "--seed", 7, "--json", "--cluster")
+    words = [
+        sys.executable,
+        "-m",
+        "flatpush",
+        *alone.args[1:],
+        "--cluster",
+    ]  # its workers are processes as well
+    spread = subprocess.run(words, capture_output=True, text=True, timeout=240)
     assert alone.returncode == spread.returncode == 0, spread.stderr
     assert json.loads(alone.stdout) == json.loads(spread.stdout)
 
@@ -57,7 +59,7 @@ def test_a_scheduler_that_does_not_answer_is_no_hang(plan, who):
         address = {"nobody": "tcp://127.0.0.1:9", "no address": "nonsense"}.get(
             who, f"tcp://127.0.0.1:{port}"
         )
-        ended = flatpush("simulate", plan, "--runs", 5, "--scheduler", address, patience=60)
+        ended = flatpush("simulate", plan, "--runs", 5, "--scheduler", address)
     assert ended.returncode == 2
     assert "no Dask scheduler answers" in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.command_line import flatpush
 
 from flatpush.documents import load_pairs, load_scene, load_surface
 from flatpush.errors import InputError
@@ -272,17 +273,12 @@ def test_a_last_line_without_an_end_is_remarked_on(tmp_path) -> None:
 # The command
 
 
-def flatpush(*arguments: str, monkeypatch, capsys) -> tuple[int, str, str]:
-    from flatpush.cli.app import main
-
-    monkeypatch.setattr("sys.argv", ["flatpush", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
+def called(*arguments: str) -> tuple[int, str, str]:
+    ended = flatpush(*arguments)
+    return ended.returncode, ended.stdout, ended.stderr
 
 
-def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path, monkeypatch, capsys) -> None:
+def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path) -> None:
     path = write(tmp_path / "three feet.csv", table(pairs(30, noise=0.02)))
     scene = tmp_path / "scene.yaml"
     feet = [[*foot, w] for foot, w in zip(FEET.tolist(), [5, 2, 3], strict=True)]
@@ -297,9 +293,9 @@ def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path, monkeypatch, 
     moved = Support.points(FEET - cof, [5, 2, 3])
     V = twists(30)
     write(path, table(Pairs(moved.wrench(V, 0.3, 10), V)))
-    status, out, err = flatpush(
+    status, out, err = called(
         "identify", str(path), "-o", str(surface), "--figure", str(figure), "--scene", str(scene), "--seeds", "1",
-        "--folds", "5", monkeypatch=monkeypatch, capsys=capsys,
+        "--folds", "5",
     )  # fmt: skip
     assert status == 0, err
     assert "loads 0.500, 0.200, 0.300 of the whole; friction × load 3.00 N" in out
@@ -309,13 +305,13 @@ def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path, monkeypatch, 
         text
         + ", surface: {file: surface.json}}\npusher: {fingers: 1}\nstart: [0, -0.2, 0]\ngoal: [0, 0, 0]\n"
     )
-    status, out, err = flatpush("describe", str(scene), "--json", monkeypatch=monkeypatch, capsys=capsys)
+    status, out, err = called("describe", str(scene), "--json")
     assert status == 0
     assert json.loads(out)["pushes"]
 
 
 @pytest.mark.slow
-def test_a_scene_is_written_with_what_predicts_best(tmp_path, monkeypatch, capsys) -> None:
+def test_a_scene_is_written_with_what_predicts_best(tmp_path) -> None:
     """Loads as the support in the scene's own units; their mean with the quartic as a quartic that is near it."""
     moved = Support.points(FEET - Support.points(FEET, [5, 2, 3]).centre, [5, 2, 3])
     V = twists(30)
@@ -329,14 +325,14 @@ def test_a_scene_is_written_with_what_predicts_best(tmp_path, monkeypatch, capsy
         f" support: {{points: {feet}}}}}\nstart: [0, -200, 0]\ngoal: [0, 0, 0]\n"
     )
     call = ("identify", str(path), "--scene", str(scene), "-o", str(target), "--seeds", "1")
-    status, out, err = flatpush(*call, monkeypatch=monkeypatch, capsys=capsys)
+    status, out, err = called(*call)
     assert status == 0, err
     assert "chosen: loads" in out
     points, shares = load_scene(target).object.support.feet
     order = np.argsort(points[:, 0])
     assert points[order] == pytest.approx(FEET[np.argsort(FEET[:, 0])], abs=1e-9)
     assert shares[order] == pytest.approx(np.array([0.5, 0.2, 0.3])[np.argsort(FEET[:, 0])], abs=1e-3)
-    status, out, err = flatpush(*call, "--model", "mean", monkeypatch=monkeypatch, capsys=capsys)
+    status, out, err = called(*call, "--model", "mean")
     assert status == 0, err
     assert "written as a quartic that is" in out
     surface = load_scene(target).object.surface
@@ -350,20 +346,20 @@ def test_a_scene_is_written_with_what_predicts_best(tmp_path, monkeypatch, capsy
             str(tmp_path / extra),
             *(["--model", "loads"] if "json" in extra else []),
         ]
-        status, _, err = flatpush(*short, monkeypatch=monkeypatch, capsys=capsys)
+        status, _, err = called(*short)
         assert status == 2
         assert words in err
 
 
-def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path, monkeypatch, capsys) -> None:
+def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path) -> None:
     data = pairs(30)
     backwards = Pairs(np.concatenate([-data.wrenches[:1], data.wrenches[1:]]), data.twists)
     path = tmp_path / "pushes.csv"
     path.write_text("\n".join([HEADER, *table(backwards), "1,2,3"]), encoding="utf-8")
-    status, _, err = flatpush("identify", str(path), monkeypatch=monkeypatch, capsys=capsys)
+    status, _, err = called("identify", str(path))
     assert status == 2
     assert "line 32: it has 3 of 6 columns" in err
-    status, out, err = flatpush(
+    status, out, err = called(
         "identify",
         str(path),
         "--skip-bad",
@@ -372,12 +368,10 @@ def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path, monkeyp
         "--seeds",
         "1",
         "--json",
-        monkeypatch=monkeypatch,
-        capsys=capsys,
     )
     assert status == 2  # 30 pairs are too few for a quartic whose weights are chosen with two folds
     assert "at least 60 pairs, got 30" in err
-    status, out, err = flatpush(
+    status, out, err = called(
         "identify",
         str(path),
         "--skip-bad",
@@ -386,8 +380,6 @@ def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path, monkeyp
         "--seeds",
         "1",
         "--json",
-        monkeypatch=monkeypatch,
-        capsys=capsys,
     )
     assert status == 0
     result = json.loads(out)
@@ -409,18 +401,18 @@ def test_identify_says_what_it_left_out_and_what_is_suspicious(tmp_path, monkeyp
         (["--figure", "x.gif"], ".svg or .png"),
     ],
 )
-def test_identify_refuses(tmp_path, monkeypatch, capsys, options, message) -> None:
+def test_identify_refuses(tmp_path, monkeypatch, options, message) -> None:
     path = write(tmp_path / "pushes.csv", table(pairs(8)))
     monkeypatch.chdir(tmp_path)
-    status, _, err = flatpush("identify", str(path), *options, monkeypatch=monkeypatch, capsys=capsys)
+    status, _, err = called("identify", str(path), *options)
     assert status == 2
     assert message in err
 
 
-def test_a_surface_belongs_to_one_experiment(tmp_path, monkeypatch, capsys) -> None:
+def test_a_surface_belongs_to_one_experiment(tmp_path) -> None:
     paths = [str(write(tmp_path / f"{name}.csv", table(pairs(24, seed=k)))) for k, name in enumerate("ab")]
     out = str(tmp_path / "s.json")
-    status, _, err = flatpush("identify", *paths, "-o", out, monkeypatch=monkeypatch, capsys=capsys)
+    status, _, err = called("identify", *paths, "-o", out)
     assert status == 2
     assert "--pool" in err
 
