@@ -1,5 +1,7 @@
 """The proof for a set of tables against linear programs, drawn loads, and the plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -188,6 +190,22 @@ def test_within_a_patch_powers_leave_their_bounds_nowhere(name):
         second_used.append(np.max(mean[far] / second[far], initial=0.0))
     assert max(first_used) > 0.8
     assert max(second_used) > (0.05 if name in ("face", "disc") else 0.2)
+
+
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_the_largest_share_is_where_the_margin_vanishes(name):
+    rng = np.random.default_rng(4)
+    cone, tables = WrenchCone.of(fingers()), TableSet.of(SUPPORTS[name], 0.1, 60)
+    twists = np.column_stack([rng.uniform(-0.3, 0.3, 40), np.ones(40), rng.uniform(-25, 25, 40)])
+    largest = tables.largest(cone, twists)
+    inside = (largest > 1e-3) & (largest < 0.99)
+    assert np.sum(inside) > 5
+    for share, V in zip(largest[inside], twists[inside], strict=True):
+        below, above = (replace(tables, share=share + d).margin(cone, V) for d in (-1e-6, 1e-6))
+        assert above < 0 < below
+    never = tables.margin(cone, twists) < 0
+    assert np.all(largest[never] < 0.1)
+    assert np.all(largest[~never] >= 0.1)
 
 
 def test_a_foot_under_the_rotation_centre_may_resist_in_any_direction():

@@ -69,6 +69,16 @@ def test_the_larger_the_set_the_wider_the_turns():
     assert radii[2] > 1.05 * radii[0]
 
 
+def test_pushes_sought_for_the_set_are_not_taken_for_the_nominal_table():
+    """Candidates are remembered by object, and were so whatever was to be proved."""
+    scene = parse_scene({**changed(loads=0.3), "pushes": "auto", "pusher": {"fingers": 1}})
+    feet = fp.Support.points([(-0.02, -0.01), (0.02, -0.01), (0.0, 0.012)])
+    scene = replace(scene, object=replace(scene.object, support=feet))
+    nominal = replace(scene, planning=replace(scene.planning, proof="nominal"))
+    assert not fp.Planner(scene).usable
+    assert len(fp.Planner(nominal).usable) == 4
+
+
 def test_one_finger_is_refused_with_what_would_do():
     one = {**changed(loads=0.1), "pusher": {"fingers": 1}}
     plan = fp.plan(parse_scene(one))

@@ -40,8 +40,8 @@ AHEAD = np.array([0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5])
 # The best of them are tried again with their distances changed by these shares: where the set is nearly too large, the
 # motions that are left are a sliver.
 NEARER = np.array([-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3])
-# Turns are looked at between these radii, by the support's, in so many steps.
-WIDE, TIGHT, STEPS = 100.0, 0.1, 40
+# Turns are looked at between these radii, by the support's, in so many steps; families are compared on finer rungs.
+WIDE, TIGHT, STEPS, RUNGS = 100.0, 0.1, 40, 256
 # Points of the pressure on which families are compared, and how many of the best are then proved.
 SKETCH, TRIED = 64, 6
 # Patches that a spread pressure is divided into.
@@ -123,19 +123,37 @@ class TableSet:
             twist: about the same point, shape (..., 3).
         """
         V = np.asarray(twist, dtype=float)
-        return self._least(cone, V.reshape(-1, 3))[0].reshape(V.shape[:-1])
+        return np.asarray(np.min(self._heights(cone, V.reshape(-1, 3)), axis=1).reshape(V.shape[:-1]))
 
     def worst(self, cone: WrenchCone, twist: ArrayLike) -> WorstTable:
         """The table that brings one twist (3,) nearest to slipping."""
         V = np.asarray(twist, dtype=float).reshape(1, 3)
-        margin, face = self._least(cone, V)
-        n = cone.faces[face[0]]
+        heights = self._heights(cone, V)[0]
+        face = int(np.argmin(heights))
+        n = cone.faces[face]
         g, *_ = self._powers(cone, V, n[None])
         change = _extreme(g[0, 0], self.weights)
-        return WorstTable(float(margin[0]), self.weights * (1 - self.share * change), n)
+        return WorstTable(float(heights[face]), self.weights * (1 - self.share * change), n)
 
-    def _least(self, cone: WrenchCone, V: Array) -> tuple[Array, Array]:
-        """Least depths and the faces they are nearest to, both (m,)."""
+    def largest(self, cone: WrenchCone, twist: ArrayLike) -> Array:
+        """The largest share, at most 1, by which loads may differ so that twists are kept, shape (...).
+
+        The least height over a face is nominal - δ spread with a spread that does not depend on δ. 0 where a twist
+        is not kept on the nominal table.
+        """
+        V = np.asarray(twist, dtype=float)
+        nominal, spread, _ = self._ranges(cone, V.reshape(-1, 3))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(spread > nominal, nominal / spread, 1.0)
+        return np.clip(np.min(share, axis=1), 0.0, 1.0).reshape(V.shape[:-1])
+
+    def _heights(self, cone: WrenchCone, V: Array) -> Array:
+        """The least depths under each face, shape (m, k)."""
+        nominal, spread, size = self._ranges(cone, V)
+        return np.asarray((nominal - self.share * spread) / size[:, None])
+
+    def _ranges(self, cone: WrenchCone, V: Array) -> tuple[Array, Array, Array]:
+        """n · W̄ and min ∫ |g - m| dw̄ for each face, shapes (m, k), and the sizes of the nominal wrenches (m,)."""
         g, first, second = self._powers(cone, V, cone.faces)
         if np.any(self.reach > 0):
             W = self.support.wrench(V) / [1.0, 1.0, cone.lever]
@@ -148,9 +166,7 @@ class TableSet:
         spread = (off + np.where(off > first, np.minimum(first, second), first)) @ self.weights
         # By the nominal wrench's size, as a depth is.
         size = np.maximum(np.linalg.norm(W, axis=1), 1e-300)
-        heights = (nominal - self.share * spread) / size[:, None]
-        faces = np.argmin(heights, axis=1)
-        return np.take_along_axis(heights, faces[:, None], axis=1)[:, 0], faces
+        return nominal, spread, size
 
     def _wrenches(self, cone: WrenchCone, V: Array) -> Array:
         unit, _ = self._velocities(V)
@@ -283,15 +299,16 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     found = []
     for sense in (1.0, -1.0):
 
-        def tightest(
-            table: TableSet, best: Array, shares: Array, sense: float = sense
-        ) -> tuple[Array, Array]:
-            return _tightest(table, cones, best, -ahead * shares[:, None] * perpendicular(straight), sense)
+        def leans(shares: Array) -> Array:
+            return -ahead * shares[:, None] * perpendicular(straight)
 
-        first = np.argsort(-tightest(sketch, families, shares)[1], kind="stable")[:TRIED]
-        near = np.repeat(families[first], len(NEARER), axis=0), np.add.outer(shares[first], NEARER).ravel()
-        first = np.argsort(-tightest(sketch, *near)[1], kind="stable")[:TRIED]
-        centres, tight = tightest(tables, near[0][first], near[1][first])
+        first = _turning_most(sketch, cones, families, leans(shares), sense)
+        best, near = (
+            np.repeat(families[first], len(NEARER), axis=0),
+            np.add.outer(shares[first], NEARER).ravel(),
+        )
+        first = _turning_most(sketch, cones, best, leans(near), sense)
+        centres, tight = _tightest(tables, cones, best[first], leans(near[first]), sense)
         found.append(centres[tight > 0])
     lefts, rights = found
     if not len(lefts) or not len(rights):
@@ -306,28 +323,57 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
 
 
 def _kept(tables: TableSet, cones: Sequence[WrenchCone], twists: Array) -> Array:
-    return np.asarray(np.min([tables.margin(cone, twists) for cone in cones], axis=0) >= 0)
+    """Whether twists (..., 3) are kept in every cone, shape (...)."""
+    V = twists.reshape(-1, 3)
+    kept = np.arange(len(V))
+    for cone in cones:
+        kept = kept[tables.margin(cone, V[kept]) >= 0]
+    return np.isin(np.arange(len(V)), kept).reshape(twists.shape[:-1])
+
+
+def _motions(families: Array, leans: Array, turn: Array) -> Array:
+    """Of families (n, 2) that lean (n, 2) by the turn, at turns per length (..., 1 or n), shape (..., n, 3)."""
+    v = families + turn[..., None] * leans
+    return np.concatenate([v, np.broadcast_to(turn[..., None], (*v.shape[:-1], 1))], axis=-1)
+
+
+def _turns(tables: TableSet, steps: int) -> Array:
+    return np.asarray(1.0 / (tables.radius * WIDE * (TIGHT / WIDE) ** np.linspace(0.0, 1.0, steps)))
+
+
+def _turning_most(
+    tables: TableSet, cones: Sequence[WrenchCone], families: Array, leans: Array, sense: float
+) -> Array:
+    """About TRIED of the families, those that every table still keeps in the tightest turns, as indices.
+
+    By bisection over the rungs of turns, so it takes a family to be kept in all turns wider than one in which it is.
+    """
+    turns, low, high, left = _turns(tables, RUNGS), 0, RUNGS, np.arange(len(families))
+    while low < high:
+        middle = (low + high) // 2
+        kept = left[_kept(tables, cones, _motions(families[left], leans[left], sense * turns[[middle]]))]
+        if len(kept) >= TRIED or (middle == 0 and len(kept)):
+            low, left = middle + 1, kept
+        else:
+            high = middle
+    return left
 
 
 def _tightest(
     tables: TableSet, cones: Sequence[WrenchCone], families: Array, leans: Array, sense: float
 ) -> tuple[Array, Array]:
     """Centres (n, 2) of the tightest turns of families that are kept from straight on, and turns per length (n,)."""
-    turns = 1.0 / (tables.radius * WIDE * (TIGHT / WIDE) ** np.linspace(0.0, 1.0, STEPS))
-
-    def motions(turn: Array) -> Array:
-        return np.concatenate([families + turn[..., None] * leans, turn[..., None]], axis=-1)
-
-    good = _kept(tables, cones, motions(sense * np.repeat(turns[:, None], len(families), axis=1)))
+    turns = _turns(tables, STEPS)
+    good = _kept(tables, cones, _motions(families, leans, sense * turns[:, None]))
     count = np.where(good.all(axis=0), len(turns), np.argmin(good, axis=0))
     low = np.where(count > 0, turns[np.maximum(count - 1, 0)], 0.0)
     high = np.where(count < len(turns), turns[np.minimum(count, len(turns) - 1)], low)
     for _ in range(8):
         middle = 0.5 * (low + high)
-        fine = np.logical_and(_kept(tables, cones, motions(sense * middle)), low > 0)
+        fine = np.logical_and(_kept(tables, cones, _motions(families, leans, sense * middle)), low > 0)
         low, high = np.where(fine, middle, low), np.where(fine, high, middle)
     with np.errstate(divide="ignore", invalid="ignore"):
-        V = motions(sense * low)
+        V = _motions(families, leans, sense * low)
         return np.asarray(perpendicular(V[:, :2]) / V[:, 2:]), low
 
 

@@ -10,6 +10,7 @@ from ..contact.placement import SMOOTH_CORNER
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from ..problem import Object, Push, Scene
+from ..problem.mechanics import proved_for_set
 from .options import PushOption, push_option
 
 # A stretch ends where its normal has turned this far, so that a smooth outline gets pushes from all sides.
@@ -27,7 +28,7 @@ ASIDE = (0.3, 2, -2, 6, -6, 12, -12)
 FEW = 20
 EQUAL = 1e-7  # radii that differ by this part are equal
 # What of how to plan makes a push a good one.
-GOODNESS_KEYS = "model", "two_finger", "friction_margin", "cost"
+GOODNESS_KEYS = "model", "two_finger", "friction_margin", "cost", "proof"
 Found = tuple[tuple[Push, ...], tuple[PushOption, ...]]
 _known: WeakKeyDictionary[Object, dict[tuple[Any, ...], Found]] = WeakKeyDictionary()
 
@@ -205,8 +206,11 @@ def _side(inward: Array, taken: list[str]) -> str:
 
 def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
     """The best place by one finger and an ellipsoid, which is quick to tell, then around it as the scene asks."""
+    nominal = _nominal(scene)
     quick = replace(
-        scene, planning=replace(scene.planning, model="ellipsoid"), pusher=replace(scene.pusher, fingers=1)
+        nominal,
+        planning=replace(nominal.planning, model="ellipsoid"),
+        pusher=replace(scene.pusher, fingers=1),
     )
     guess = _best(quick, stretch)
     if guess is None:
@@ -225,7 +229,7 @@ def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
         if 0 < fraction < 1 and not at.corner and fraction not in places:
             pusher = scene.pusher
             push = Push(stretch.name, at, pusher.fingers, pusher.spacing if pusher.fingers == 2 else 0.0)
-            tried.append(push_option(scene, push, quick=True))
+            tried.append(push_option(nominal, push, quick=True))
             places.append(fraction)
             car = tried[-1].car
             radii.append(np.inf if car is None else car.radius)
@@ -243,12 +247,30 @@ def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
         for step in (-CLOSER, CLOSER):
             look(centre + step)
         best = _first(np.array(radii))
-    return tried[best]
+    return _proved(scene, [tried[best], *(tried[i] for i in np.argsort(radii, kind="stable"))])
+
+
+def _nominal(scene: Scene) -> Scene:
+    """The scene on its nominal table, where places are compared in less time."""
+    return replace(scene, planning=replace(scene.planning, proof="nominal"))
+
+
+def _proved(scene: Scene, options: list[PushOption]) -> PushOption:
+    """The first of a nominal scene's pushes, best first, that can be made on all tables that the scene asks for."""
+    if not proved_for_set(scene) or options[0].car is None:
+        return options[0]
+    proved = (push_option(scene, o.push) for o in options if o.car is not None)
+    first = next(proved)
+    return first if first.car is not None else next((o for o in proved if o.car is not None), first)
 
 
 def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
-    """Coarse search over the stretch, then golden section around its best."""
+    """Coarse search over the stretch, then golden section around its best.
+
+    Places are compared on the nominal table; the best that holds on all tables of a set is taken where that is asked.
+    """
     tried: dict[float, PushOption] = {}
+    nominal = _nominal(scene)
 
     def radius(fraction: float) -> float:
         at = stretch.at(scene.object.outline, fraction)
@@ -256,7 +278,7 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
             return np.inf
         pusher = scene.pusher
         push = Push(stretch.name, at, pusher.fingers, pusher.spacing if pusher.fingers == 2 else 0.0)
-        option = push_option(scene, push, quick=True)
+        option = push_option(nominal, push, quick=True)
         tried[fraction] = option
         return option.car.radius if option.car is not None else np.inf
 
@@ -273,6 +295,7 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
                 if 0 < f < 1 and (value := radius(f)) < best - 1e-9 * best:
                     centre, best = f, value
                     break
-        return tried[centre]
+        order = grid[np.argsort(radii, kind="stable")]
+        return _proved(scene, [tried[centre], *(tried[f] for f in order.tolist() if f in tried)])
     reasons = [o for o in tried.values() if o.refusal]
     return reasons[0] if reasons else None

@@ -6,15 +6,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..contact import Placement, PointContact, cone_twists, narrowed, place_fingers
-from ..contact.table_set import PATCHES, TableSet, set_twists, shifted
+from ..contact.table_set import TableSet, set_twists, shifted
 from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from .scene import Cost, Model, Object, Push, Scene
-
-# Patches of a spread pressure while places are compared.
-QUICK_PATCHES = 100
 
 
 def named(scene: Scene, name: str) -> Push:
@@ -64,7 +61,7 @@ def cone_motions(
     motions = _cone_motions(scene.object, placement, surface, share, planning.cost, quick)
     if not proved_for_set(scene):
         return motions
-    return _set_motions(scene.object, placement, share, motions.tobytes(), quick)
+    return _set_motions(scene.object, placement, share, motions.tobytes())
 
 
 def proved_for_set(scene: Scene) -> bool:
@@ -148,13 +145,13 @@ def _cone_motions(
 
 
 @lru_cache(maxsize=256)
-def _set_motions(thing: Object, placement: Placement, margin: float, nominal: bytes, quick: bool) -> Array:
+def _set_motions(thing: Object, placement: Placement, margin: float, nominal: bytes) -> Array:
     assert thing.uncertainty is not None
     known = thing.uncertainty
     low = known.friction[0] if known.friction else thing.friction
     contacts = [replace(c, friction=low) for c in _contacts(thing, placement)]
     cones = [narrowed(pair, margin) for pair in shifted(contacts, known.offset)]
-    tables = TableSet.of(thing.support, known.loads, QUICK_PATCHES if quick else PATCHES)
+    tables = TableSet.of(thing.support, known.loads)
     motions = set_twists(tables, cones, np.frombuffer(nominal).reshape(3, 3))
     motions.setflags(write=False)
     return motions

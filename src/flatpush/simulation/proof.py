@@ -14,9 +14,6 @@ from ..problem import Plan, PushSegment, Scene
 from ..problem.mechanics import contacts_of, named, placement_of
 from ..problem.scene import Uncertainty
 
-# The largest share of loads is found to this [parts of the nominal loads].
-RESOLVED = 1e-4
-
 
 @dataclass(frozen=True, eq=False)
 class Proof:
@@ -90,43 +87,28 @@ def proof_of(scene: Scene, pushes: Sequence[PushSegment]) -> Proof | None:
         return None
     mu = scene.object.friction if known.friction is None else known.friction[0]
     tables = TableSet.of(scene.object.support, known.loads)
-    found: list[tuple[WrenchCone, Array, str, int]] = []
+    margins, loads, found = [], 1.0, list[tuple[WrenchCone, Array, str, int]]()
     for segment in pushes:
         contacts = contacts_of(scene, placement_of(scene, named(scene, segment.push)))
+        moving = [i for i, arc in enumerate(segment.arcs) if arc.duration > 0]
+        if not moving:
+            continue
+        twists = np.array([shift_twist(segment.arcs[i].twist, scene.object.cof) for i in moving])
         for pair in shifted([replace(c, friction=mu) for c in contacts], known.offset):
             cone = WrenchCone.of(pair)
-            found += [
-                (cone, shift_twist(arc.twist, scene.object.cof), segment.push, i)
-                for i, arc in enumerate(segment.arcs)
-                if arc.duration > 0
-            ]
+            found += [(cone, V, segment.push, i) for i, V in zip(moving, twists, strict=True)]
+            margins += tables.margin(cone, twists).tolist()
+            loads = min(loads, float(np.min(tables.largest(cone, twists))))
     if not found:
         return None
-    margins = [float(tables.margin(cone, twist)) for cone, twist, _, _ in found]
     worst = int(np.argmin(margins))
     cone, twist, push, number = found[worst]
     return Proof(
         margins[worst] >= 0,
         margins[worst],
-        _largest(tables, [(c, V) for c, V, _, _ in found]),
+        loads,
         push,
         number,
         tables.points + scene.object.cof,
         tables.worst(cone, twist).loads,
     )
-
-
-def _largest(tables: TableSet, motions: list[tuple[WrenchCone, Array]]) -> float:
-    """By bisection: the margin falls as the set grows."""
-
-    def holds(share: float) -> bool:
-        grown = replace(tables, share=share)
-        return all(float(grown.margin(cone, twist)) >= 0 for cone, twist in motions)
-
-    low, high = 0.0, 1.0 - RESOLVED
-    if not holds(low) or holds(high):
-        return low if not holds(low) else high
-    while high - low > RESOLVED:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
