@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import is_finite
 from ..errors import InputError, NoDubinsReduction
@@ -313,8 +313,8 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     lefts, rights = found
     if not len(lefts) or not len(rights):
         raise NoDubinsReduction(_nothing(tables, "turn the object both ways"))
-    best = int(np.argmin(np.linalg.norm(lefts[:, None] - rights[None], axis=2)))
-    left, right = lefts[best // len(rights)], rights[best % len(rights)]
+    pair = int(np.argmin(np.linalg.norm(lefts[:, None] - rights[None], axis=2)))
+    left, right = lefts[pair // len(rights)], rights[pair % len(rights)]
     square = -perpendicular(left - right)
     square = square / np.hypot(*square)
     if not _kept(tables, cones, np.array([*square, 0.0])):
@@ -322,7 +322,7 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     return np.stack([[*-perpendicular(left), 1.0], [*square, 0.0], [*perpendicular(right), -1.0]])
 
 
-def _kept(tables: TableSet, cones: Sequence[WrenchCone], twists: Array) -> Array:
+def _kept(tables: TableSet, cones: Sequence[WrenchCone], twists: Array) -> NDArray[np.bool_]:
     """Whether twists (..., 3) are kept in every cone, shape (...)."""
     V = twists.reshape(-1, 3)
     kept = np.arange(len(V))
@@ -343,7 +343,7 @@ def _turns(tables: TableSet, steps: int) -> Array:
 
 def _turning_most(
     tables: TableSet, cones: Sequence[WrenchCone], families: Array, leans: Array, sense: float
-) -> Array:
+) -> NDArray[np.intp]:
     """About TRIED of the families, those that every table still keeps in the tightest turns, as indices.
 
     By bisection over the rungs of turns, so it takes a family to be kept in all turns wider than one in which it is.
