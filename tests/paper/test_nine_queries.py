@@ -5,12 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from flatpush.contact import PointContact
-from flatpush.friction import Ellipsoid
+from flatpush.experiments.stored_graphs import queries
 from flatpush.planning.query import Query
 from flatpush.planning.refine import refine
-from flatpush.steering.car import Car
-from flatpush.steering.fleet import Fleet
 
 # What a prototype found [m, switching included]; ours may be 5 % above and is in fact nowhere above.
 PROTOTYPE = {
@@ -18,33 +15,12 @@ PROTOTYPE = {
     "plan_graph_butter_mu025nd10_cs05_vbhalfmm": (0.1815, 0.1069, 0.2236),
     "plan_graph_triangle_mu03nd15": (0.1867, 0.0988, 0.3419),
 }
-SHORT = 0.98  # stored lengths miss the last of fifty steps
-
-
-def stored_fleet(document) -> Fleet:
-    """The middle contacts, their normals, a and b as stored; no margin."""
-    cars = []
-    for push in document["push_actions"]:
-        surface = Ellipsoid(np.diag([push["a"], push["a"], push["b"]]))
-        normal = np.array(push["inward_normal"])
-        contact = PointContact(np.array(push["contact_point"]), normal / np.linalg.norm(normal), push["mu"])
-        cars.append(Car.of(contact, surface))
-    return Fleet.of(cars, np.array([car.weights("flat") for car in cars]), switching=document["cost_switch"])
 
 
 def cases(data_folder):
-    folder = data_folder / "plan_graph"
-    reference = json.loads((folder / "requery_reference.json").read_text())
-    for name, prototype in PROTOTYPE.items():
-        fleet = stored_fleet(json.loads((folder / f"{name}.json").read_text()))
-        queries = reference[name]
-        if "butter" in name:  # the order of the figure, not of the file
-            queries = sorted(queries, key=lambda q: q["query_offset_mm_mm_rad"][0])
-        for query, best in zip(queries, prototype, strict=True):
-            start = np.array(query["query_offset_mm_mm_rad"]) * [1e-3, 1e-3, 1]
-            switching = float(fleet.switching[0, 1]) * (len(query["actions"]) - 1)
-            stored = (query["cost_toolbox_m"] - switching) / SHORT + switching
-            yield name, fleet, start, stored, best
+    best = iter([cost for prototype in PROTOTYPE.values() for cost in prototype])
+    for query in queries(data_folder):
+        yield query.graph, query.fleet, query.start, query.cost, next(best)
 
 
 def test_the_nine_robot_queries_are_planned_better(data_folder):

@@ -1,22 +1,22 @@
-"""Spreads a study over the processes of a Dask cluster: a local one, or one that exists."""
+"""Spreads work over the processes of a Dask cluster: a local one, or one that exists."""
 
 import asyncio
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from ..errors import FlatpushError, InputError, MissingExtra
 
-if TYPE_CHECKING:
-    from ..simulation.study import Chunk, Runs, Spread
+A = TypeVar("A")
+B = TypeVar("B")
 
 PATIENCE = 8.0  # [s] for a scheduler to find workers
 ANSWER = 1.0  # [s] for it to say who it is
 
 
 @contextmanager
-def cluster(scheduler: str | None) -> Iterator["Spread"]:
+def cluster(scheduler: str | None) -> Iterator["Mapper"]:
     """A function like map whose calls run on the workers of the scheduler at an address, or of a local cluster.
 
     Raises:
@@ -42,7 +42,7 @@ def cluster(scheduler: str | None) -> Iterator["Spread"]:
                 ) as local,
                 distributed.Client(local) as client,
             ):
-                yield _mapper(client)
+                yield Mapper(client)
             return
         try:
             asyncio.run(asyncio.wait_for(_ask(scheduler), ANSWER))
@@ -65,7 +65,7 @@ def cluster(scheduler: str | None) -> Iterator["Spread"]:
                         value=scheduler,
                         hint=f"Start some with: dask worker {scheduler}",
                     ) from None
-            yield _mapper(client)
+            yield Mapper(client)
 
 
 async def _ask(scheduler: str) -> None:
@@ -88,16 +88,27 @@ async def _ask(scheduler: str) -> None:
         raise ValueError("what answers is no scheduler")
 
 
-def _mapper(client: Any) -> "Spread":
-    def spread(function: Callable[["Chunk"], "Runs"], chunks: Sequence["Chunk"]) -> list["Runs"]:
-        futures = client.map(function, chunks, pure=False)
+class Mapper:
+    """A function like map whose calls run on the workers of a cluster."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def __call__(
+        self, function: Callable[[A], B], jobs: Sequence[A], told: Callable[[B], None] | None = None
+    ) -> list[B]:
+        """The results in the order of the jobs; `told` is called with each as soon as it is there."""
+        from distributed import as_completed
+
+        futures = self._client.map(function, jobs, pure=False)
         try:
-            return list(client.gather(futures))
+            if told is not None:
+                for _, result in as_completed(futures, with_results=True):
+                    told(result)
+            return list(self._client.gather(futures))
         except FlatpushError:
             raise
         except Exception as error:
             raise FlatpushError(f"a worker failed: {type(error).__name__}: {error}") from error
         finally:
-            client.cancel(futures)
-
-    return spread
+            self._client.cancel(futures)

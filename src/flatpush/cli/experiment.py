@@ -1,5 +1,6 @@
 """flatpush experiment: the paper's figures and the project's measurements."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,8 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
+
+ALL, REPORT = "all", "index.html"
 
 
 def command(
@@ -31,15 +34,43 @@ def command(
     seeds: Annotated[
         str | None, typer.Option(metavar="FIRST:END", help="Range of seeds, END not included, for push-t.")
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Where `all` writes its report, index.html."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Of `all`: fewer random runs, no fits.")] = False,
+    on_cluster: Annotated[
+        bool, typer.Option("--cluster", help="Spread `all` over a local Dask cluster.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Spread `all` over the Dask cluster at this address."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> int:
-    """Run experiments NAMES and print their tables."""
+    """Run experiments NAMES and print their tables; `all` writes the whole paper as one page."""
     from ..experiments import EXPERIMENTS, experiment
 
     if not names:
-        for name, about in EXPERIMENTS.items():
-            typer.echo(f"{name:<12} {about}")
+        for name, about in {**EXPERIMENTS, ALL: "the whole paper as one page: -o FOLDER, --quick"}.items():
+            typer.echo(f"{name:<13} {about}")
         return 0
+    if ALL in names:
+        _refuse(
+            {
+                "other experiments": len(names) > 1,
+                "--figures": figures is not None,
+                "--runs": runs is not None,
+                "--seed": seed is not None,
+                "--seeds": seeds is not None,
+            },
+            "all",
+        )
+        return _all(output, quick, data, on_cluster, scheduler, as_json)
+    _refuse(
+        {"-o": output is not None, "--quick": quick, "--cluster": on_cluster, "--scheduler": bool(scheduler)},
+        ", ".join(names),
+    )
     ready = [experiment(name, data, runs, seed, seeds) for name in names]
     if figures is not None and not figures.is_dir():
         raise InputError("the folder for figures does not exist", source=str(figures))
@@ -52,3 +83,77 @@ def command(
     if as_json:
         print_json(tables)
     return 0
+
+
+def _refuse(given: dict[str, bool], names: str) -> None:
+    """Refuses options that these experiments do not take."""
+    for option, there in given.items():
+        if there:
+            raise InputError(f"flatpush experiment {names} does not go with {option}")
+
+
+def _all(
+    output: Path | None,
+    quick: bool,
+    data: Path | None,
+    on_cluster: bool,
+    scheduler: str | None,
+    as_json: bool,
+) -> int:
+    from dataclasses import asdict
+
+    from ..documents.atomic import check_writable, write_atomically
+    from ..experiments.everything import SECTIONS, Done, everything, in_processes
+    from ..experiments.report import page
+
+    if output is None and not as_json:
+        raise InputError("flatpush experiment all needs a folder for its report", hint="-o report")
+    folder = data or (Path(os.environ["FLATPUSH_DATA"]) if os.environ.get("FLATPUSH_DATA") else None)
+    if folder is not None and not folder.is_dir():
+        raise InputError("the folder of recorded data does not exist", source=str(folder))
+    if output is not None:
+        if not output.is_dir():
+            check_writable(output)
+            output.mkdir()
+        check_writable(output / REPORT)
+    done = 0
+
+    def told(one: Done) -> None:
+        nonlocal done
+        done += 1
+        word = "left out: " + one.finding.missing if one.finding.missing else f"{one.cpu:.0f} s of CPU"
+        typer.echo(f"{done} of {len(SECTIONS)}: {one.job.name} ({word})", err=True)
+
+    if on_cluster or scheduler is not None:
+        from .cluster import cluster
+
+        with cluster(scheduler) as spread:
+            found = everything(quick, folder, spread, told)
+    else:
+        found = everything(quick, folder, in_processes(os.cpu_count() or 1), told)
+    if output is not None:
+        write_atomically(output / REPORT, page(found, _machine(), quick))
+    if as_json:
+        print_json(
+            {
+                section.name: {
+                    "rows": [asdict(row) for row in one.finding.rows],
+                    "missing": one.finding.missing or None,
+                }
+                for section, one in found
+            }
+        )
+    else:
+        typer.echo(f"wrote {output / REPORT}" if output is not None else "")
+    return 0
+
+
+def _machine() -> str:
+    import platform
+
+    from .. import __version__
+
+    return (
+        f"flatpush {__version__}, Python {platform.python_version()}, {platform.system()} on {platform.machine()},"
+        f" {os.cpu_count()} processors"
+    )

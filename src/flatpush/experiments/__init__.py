@@ -9,15 +9,20 @@ from pathlib import Path
 from ..errors import InputError
 
 EXPERIMENTS = {
+    "duality": "cones, rotation centres, flat outputs of one finger (paper, Figs. 1 and 2, Proposition 1, Theorem 1)",
     "fig3": "two paths of a single-finger push (paper, Fig. 3)",
     "fig4": "feedback linearisation of a single-finger push, and what its numbers mean (paper, Fig. 4)",
     "fig6": "two fingers on a robot, in the physics cell: a rectangle on three feet (paper, Fig. 6; --runs, --seed)",
     "fig7": "the same with a rectangle on its edge (paper, Fig. 7)",
     "fig8": "the same with a butterfly (paper, Fig. 8)",
     "fig9": "the same with a triangle (paper, Fig. 9)",
+    "sequences": "plans of Figs. 6-9, simulated many times with random starts and friction",
+    "fig10": "the triangle among obstacles, and moments of its plan (paper, Figs. 10 and 11)",
     "sugar-box": "two queries of planning-through-contact",
     "open-loop": "where open-loop plans end under each model, from arcs and from samples",
     "cone": "two fingers with their composite cone against their virtual middle contact",
+    "loops": "open loop against feedback, one finger on tables other than believed",
+    "stored-graphs": "the authors' stored graphs against refined plans, on the robot's nine queries (--data)",
     "replay": "recorded runs of a robot through the simulator, calibrated and not (--data)",
     "crowded": "scenes full of obstacles, from a narrow passage to two hundred obstacles",
     "feedback": "random tasks of one finger under feedback, on another table than believed (--runs, --seed)",
@@ -32,7 +37,7 @@ TOGETHER = dict.fromkeys(("fig6", "fig7", "fig8", "fig9"), "robot_runs")
 # Those that take a range of seeds.
 SEEDED = {"push-t"}
 # Those that need the folder of recorded data.
-RECORDED = {"force-pushes", "motion-pushes", "replay"}
+RECORDED = {"force-pushes", "motion-pushes", "replay", "stored-graphs"}
 
 
 def experiment(

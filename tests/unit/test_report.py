@@ -1,0 +1,106 @@
+"""The whole paper as one page: its sections, their order, and what a missing extra or folder makes of them."""
+
+import re
+from concurrent.futures import ThreadPoolExecutor, as_completed
+
+import numpy as np
+import pytest
+
+from flatpush.cli import main
+from flatpush.contact import PointContact
+from flatpush.experiments import EXPERIMENTS, duality, experiment
+from flatpush.experiments.everything import SECTIONS, Done, Job, compute, everything
+from flatpush.experiments.finding import Finding, Row
+from flatpush.experiments.report import page
+from flatpush.friction import Ellipsoid
+
+
+def found(job: Job) -> Done:
+    return Done(
+        job, Finding((Row(job.name, "<1 mm", "2 & 3", "why"),), (("a.svg", "<svg/>"),), job.name), 1.0
+    )
+
+
+def backwards(function, jobs, told):
+    """Every job in a thread, started from the last."""
+    with ThreadPoolExecutor(4) as pool:
+        futures = {pool.submit(function, job): job for job in reversed(jobs)}
+        done = {}
+        for future in as_completed(futures):
+            told(future.result())
+            done[futures[future]] = future.result()
+    return [done[job] for job in jobs]
+
+
+def test_sections_stand_in_their_order_wherever_they_were_computed(monkeypatch):
+    monkeypatch.setattr("flatpush.experiments.everything.compute", found)
+    told = []
+    sections = everything(True, None, backwards, told.append)
+    assert [done.job.name for _, done in sections] == [section.name for section in SECTIONS]
+    assert sorted(done.job.name for done in told) == sorted(section.name for section in SECTIONS)
+    text = page(sections, "this machine", True)
+    assert re.findall(r'<section id="([\w-]+)">', text) == [section.name for section in SECTIONS]
+    assert "&lt;1 mm" in text
+    assert "2 &amp; 3" in text
+    assert "quick edition" in text
+    assert "quick edition" not in page(sections, "", False)
+    # Nothing is fetched: every link stays in the page, every picture is in it.
+    assert set(re.findall(r'(?:src|href)="([^"]{4})', text)) <= {
+        "data",
+        *(f"#{s.name}"[:4] for s in SECTIONS),
+    }
+    assert text.count("data:image/svg+xml;base64,PHN2Zy8+") == len(SECTIONS)
+
+
+def test_every_section_is_an_experiment_of_its_own():
+    assert {section.name for section in SECTIONS} <= set(EXPERIMENTS)
+
+
+@pytest.mark.parametrize("name", ["replay", "stored-graphs"])
+def test_a_section_without_its_data_says_so(name):
+    done = compute(Job(name, quick=True))
+    assert "--data" in done.finding.missing
+    assert not done.finding.rows
+    assert done.finding.missing in page([(SECTIONS[0], done)], "", True)
+
+
+def test_rotation_centres_lie_on_the_line_and_poses_come_back_from_any_point_of_it(tmp_path):
+    """Both another way: a turn about the centre moves the contact as u = J A Jᵀ f, and the path is retraced."""
+    text = experiment("duality")(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"figs1_2.svg", "proposition1.svg", "theorem1.svg"}
+    assert text.count("Theorem 1,") == 3
+    at = duality.contact(duality.PLACES["2 mm beside it"])
+    for force, centre in zip(*duality.centres(at), strict=True):
+        jacobian = np.array([[1.0, 0.0, -at.point[1]], [0.0, 1.0, at.point[0]]])
+        u = jacobian @ duality.SURFACE.matrix @ jacobian.T @ force
+        assert u @ (at.point - centre) == pytest.approx(0, abs=1e-12 * np.hypot(*u))
+    assert max(duality.line_errors().values()) < 1e-12
+    assert max(duality.recovered().values()) < 1e-9
+
+
+def test_a_matrix_that_is_not_of_the_paper_s_form_breaks_the_line(monkeypatch):
+    """So the picture of Proposition 1 shows something: with A22 ≠ A11 the centres are no longer at ρ/r."""
+    monkeypatch.setattr(duality, "SURFACE", Ellipsoid(np.diag([1.0215, 1.6, 1936.73])))
+    assert duality.line_errors()["2 mm beside it"] > 1e-5
+    assert isinstance(duality.contact((0.0, -0.018)), PointContact)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("all",), "folder"),
+        (("all", "fig3", "-o", "report"), "other experiments"),
+        (("all", "--runs", "3", "-o", "report"), "--runs"),
+        (("fig3", "--quick"), "--quick"),
+        (("all", "-o", "no/such/report"), "no such folder"),
+        (("all", "-o", "report", "--data", "nowhere"), "recorded data"),
+    ],
+)
+def test_what_all_refuses(words, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["flatpush", "experiment", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert told in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
