@@ -12,6 +12,7 @@ from ...geometry.pose import Array
 from ...planning import Planner
 from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
+from ..laws.push_controller import pusher_velocity
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
 from ..loop.frames import hand, mean_pose, predicted
@@ -300,13 +301,14 @@ class HorizonController(AbstractController[HorizonState]):
         flat, goal = m.flat_of(pose), m.flat_of(target)
         driven = self._driven(state, float(pose[2]), time)
         allowed = state.allowed - driven
+        before = state.rest - driven
         rest = rest_of_path(
             flat,
             goal,
             car.radius,
             m.left,
             m.right,
-            state.rest - driven,
+            before,
             self.scene.pusher.speed * dt,
             float(m.flat_point @ m.direction),
             self.tolerance,
@@ -321,8 +323,7 @@ class HorizonController(AbstractController[HorizonState]):
         end = braking(rest.length, BRAKE * self.scene.pusher.acceleration / ratio, dt)
         speed = min(self.scene.pusher.speed / max(1.0, ratio), end + 1e-9)
         omega = rest.curvature * speed
-        u = point_velocity(flat[2], speed, omega, float(arm[0]), float(arm[1]), float(pose[2]), dt, RAMP)
-        velocity = np.array([u[0], u[1], omega if m.turns else 0.0])
+        velocity = pusher_velocity(m, pose, speed, omega, dt)
         window = state.window
         if window is not None:
             window = replace(window, ratios=(*window.ratios, car.ratio(rest.curvature)))
@@ -330,7 +331,7 @@ class HorizonController(AbstractController[HorizonState]):
             state,
             mode="push",
             note=rest.how,
-            rest=rest.length,
+            rest=rest.due(before),
             allowed=allowed,
             window=window,
             expected=pose,

@@ -5,21 +5,23 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...steering.dubins import shortest_path
+from ...steering.dubins import DubinsPath, shortest_path
 from ..laws.formulas import wrapped
 
 #: "even": two arcs, none tighter than with the reserve; "planned": a Dubins path with the reserve; "tight": one with
-#: the tightest turns that feedback may use; "closing": none leads there without a loop, and what is left of the errors
-#: is spread by two arcs or, near the end, by the turn after which least is missed; "past": the end is abeam or behind,
-#: or the planned length is used up.
+#: the widest turns that lead there, as far as feedback may use them; "closing": none leads there without a loop, and
+#: what is left of the errors is spread by two arcs or, near the end, by the turn after which least is missed; "past":
+#: the end is abeam or behind, or the planned length is used up.
 How = Literal["even", "planned", "tight", "closing", "past"]
 
-# A rest longer than what is left of the last by more than this is another path: a loop [radii].
+# A rest longer than what should be left by more than this is another path: a loop [radii].
 LONGER = 0.15
-# By so much of a step a planned rest may grow in it.
-GROWS = 0.25
 # Far from the end, in radii of what is left of the last, it may grow by a radius.
 FAR = 4.0
+# In a tick what should be left follows what was found by so much of the difference.
+SHARE = 0.05
+# Halvings of what lies between the tightest turns and those with the reserve.
+HALVINGS = 4
 # Two arcs are for headings that differ from the way straight to the goal by less than this [rad].
 EVEN = 1.0
 # The last stretch is shorter than this [radii] and within this of the heading [rad].
@@ -32,6 +34,11 @@ class Rest(NamedTuple):
     curvature: float
     length: float
     how: How
+
+    def due(self, before: float) -> float:
+        """What should be left [m], by what should have been before it was found: it follows slowly, since what noise
+        makes shorter is no promise."""
+        return self.length if math.isinf(before) else before + SHARE * (self.length - before)
 
 
 def rest_of_path(
@@ -49,7 +56,8 @@ def rest_of_path(
 
     Args:
         radius: of the turns with the reserve [m]. left, right: most turn per length to either side [1/m].
-        before: length of the rest found last, less what was driven since [m]; infinite if there was none.
+        before: what should be left of the push by now [m]: what was due at the last tick, less what was driven since;
+            infinite if there was none.
         step: what is driven of it now: the turn of a Dubins path is the mean one over that [m].
         lever: how far the flat point lies ahead of the object's origin [m].
         tolerance: of the object's place [m] and angle [rad], by which errors compare where both cannot be met.
@@ -64,25 +72,46 @@ def rest_of_path(
     near = before < radius and abs(skew) < SKEW
     if before <= 0 or (near and ahead <= 0):
         return Rest(0.0, 0.0, "past")
-    most = before + LONGER * radius
+    # With most of a way still to go a longer one is better than to close in what is left of a loop.
+    most = before + (1.0 if before > FAR * radius else LONGER) * radius
     sight = math.atan2(goal[1] - flat[1], goal[0] - flat[0])
     if max(abs(wrapped(flat[2] - sight)), abs(wrapped(goal[2] - sight))) < EVEN:
         kappa, other, length = biarc(flat, goal)
         if max(abs(kappa), abs(other)) * radius <= 1 and length <= most:
             return Rest(kappa, length, "even")
-    # On the brink of being too late for a turn the planned one comes out a little longer at every step; with most of a
-    # way still to go a longer one is better than to close in what is left of a loop.
-    known = before + (radius if before > FAR * radius else GROWS * step)
-    for how, turning, longest in (("planned", radius, known), ("tight", 1 / min(left, right), most)):
+    path = shortest_path(np.array(flat), np.array(goal), radius)
+    if path.length <= most:
+        return _begun(path, radius, step, "planned", left, right)
+    # Of the turns that do the widest: what is left of the reserve is for what comes later.
+    found, wide, tight = None, radius, 1 / min(left, right)
+    for _ in range(HALVINGS):
+        turning = tight if found is None else 0.5 * (tight + wide)
         path = shortest_path(np.array(flat), np.array(goal), turning)
-        if path.length <= longest:
-            kappa = _mean_turn(path.word, path.lengths, turning, step)
-            return Rest(min(max(kappa, -right), left), path.length, how)  # type: ignore[arg-type]
+        if path.length <= most:
+            found, tight = _begun(path, turning, step, "tight", left, right), turning
+        elif found is None:
+            break
+        else:
+            wide = turning
+    if found is not None:
+        return found
     if near and ahead < CLOSE * radius:
         kappa, length = _least_miss(ahead, off, skew, lever, tolerance), ahead / max(0.5, math.cos(skew))
     else:
         kappa, _, length = biarc(flat, goal)
     return Rest(min(max(kappa, -right), left), min(length, before), "closing")
+
+
+def _begun(path: DubinsPath, radius: float, step: float, how: How, left: float, right: float) -> Rest:
+    """A Dubins path, by its mean turn over the first stretch."""
+    rest = stretch = min(step, path.length)
+    turn = 0.0
+    for letter, length in zip(path.word, path.lengths, strict=True):
+        part = min(rest, float(length))
+        turn += {"L": part, "S": 0.0, "R": -part}[letter] / radius
+        rest -= part
+    kappa = turn / stretch if stretch > 0 else 0.0
+    return Rest(min(max(kappa, -right), left), path.length, how)
 
 
 def _least_miss(ahead: float, off: float, skew: float, lever: float, tolerance: tuple[float, float]) -> float:
@@ -130,16 +159,3 @@ def _arc(tx: float, ty: float, wx: float, wy: float) -> tuple[float, float]:
     half = math.atan2(tx * wy - ty * wx, tx * wx + ty * wy)
     curvature = 2 * math.sin(half) / chord
     return curvature, chord if abs(half) < 1e-9 else chord * half / math.sin(half)
-
-
-def _mean_turn(word: str, lengths: np.ndarray, radius: float, step: float) -> float:
-    """Mean turn per length over the first stretch of a Dubins path."""
-    rest = stretch = min(step, float(np.sum(lengths)))
-    if stretch <= 0:
-        return 0.0
-    turn = 0.0
-    for letter, length in zip(word, lengths, strict=True):
-        part = min(rest, float(length))
-        turn += {"L": part, "S": 0.0, "R": -part}[letter] / radius
-        rest -= part
-    return turn / stretch
