@@ -310,7 +310,7 @@ def unsaid(module_name: str) -> Iterator[str]:
 
 ROOMS = (
     *("geometry", "geometry.collision", "friction", "contact", "steering", "problem", "documents"),
-    *("simulation", "planning", "control", "execution"),
+    *("simulation", "planning", "control", "execution", "vision"),
 )
 
 

@@ -12,6 +12,7 @@ from .. import compiling
 from ..errors import FlatpushError
 from . import (
     calibrate,
+    camera,
     describe,
     experiment,
     export,
@@ -46,6 +47,7 @@ app.command("run")(run.command)
 app.command("identify")(identify.command)
 app.command("calibrate")(calibrate.command)
 app.command("replay")(replay.command)
+app.add_typer(camera.app)
 app.command("init")(init.command)
 app.command("view")(view.command)
 app.command("experiment")(experiment.command)

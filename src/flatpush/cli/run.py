@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -56,6 +56,18 @@ def command(
         typer.Option(help="Pose of the table in the robot's base frame [m, rad].", metavar="X,Y,Z,YAW"),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise of a simulated camera.")] = 0,
+    camera: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A camera file: the controller sees the object by its tag."),
+    ] = None,
+    tag: Annotated[
+        str | None,
+        typer.Option(metavar="ID,MM,HEIGHT[,X,Y,DEG]", help="The object's tag, as of camera watch."),
+    ] = None,
+    device: Annotated[int, typer.Option(metavar="N", help="The number of the camera.")] = 0,
+    latency: Annotated[
+        float, typer.Option(metavar="SECONDS", help="How old a frame of the camera is when it comes.")
+    ] = 0.1,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a robot moves.")] = False,
     figure: Annotated[
         Path | None,
@@ -76,6 +88,8 @@ def command(
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
+    if (camera is None) != (tag is None) or (camera is not None and controller is None):
+        raise InputError("--camera, --tag and --controller go together")
     frame = numbers(base_frame, 4, "--base-frame")
     trusted = () if scene is None else scene_files(scene)
     check_outputs([plan, *trusted], [log, figure])
@@ -96,13 +110,18 @@ def command(
         tell_failed(failed)
         typer.echo("the plan fails verification; nothing was moved", err=True)
         return 4
-    with _terminated(), open_robot(robot, loaded, frame) as arm:
+    with _terminated(), open_robot(robot, loaded, frame) as arm, ExitStack() as stack:
         course = (way if controller is None else to_controller)(loaded, arm, speed)
         _show(arm.limits, course, loaded, speed)
         if getattr(arm, "real", True):
             _ask(yes, robot)
+        look = None
+        if camera is not None:
+            look = stack.enter_context(_tag_eyes(loaded, arm, camera, tag or "", device, latency, seed))
         law, eyes = (
-            (None, None) if controller is None else _closed(loaded, arm, cast("Law", controller), speed, seed)
+            (None, None)
+            if controller is None
+            else _closed(loaded, arm, cast("Law", controller), speed, seed, look, latency)
         )
         ended = run(loaded, arm, law, eyes, log, speed=speed, told=_progress(loaded.duration / speed))
     if sys.stderr.isatty():
@@ -138,27 +157,54 @@ def _terminated() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+@contextmanager
+def _tag_eyes(
+    plan: Plan, robot: Robot, camera: Path, tag: str, device: int, latency: float, seed: int
+) -> Iterator[AbstractSensor]:
+    """Eyes that see the object's tag: through a camera, or in drawn pictures where the robot is a simulated one."""
+    import numpy as np
+
+    from ..documents.camera_file import load_camera
+    from ..vision import Device, DrawnEyes, Spoil, SyntheticCamera, TagEyes, Tracker
+    from .camera import tag_of
+
+    name = plan.scene.object.name
+    tracker = Tracker(load_camera(camera), {name: tag_of(tag, "--tag")})
+    if getattr(robot, "object", None) is None:
+        with Device(device, latency, tracker.camera.size) as frames:
+            yield TagEyes(tracker, frames)
+        return
+    top = {name: plan.scene.object.outline.polyline()}
+    drawn = SyntheticCamera(tracker.camera, tracker.tags, top, spoil=Spoil(noise=4, blur=0.8))
+    yield DrawnEyes(tracker, drawn, np.random.default_rng(seed), latency=latency)
+
+
 def _closed(
-    plan: Plan, robot: Robot, law: Law, speed: float, seed: int
+    plan: Plan,
+    robot: Robot,
+    law: Law,
+    speed: float,
+    seed: int,
+    eyes: AbstractSensor | None = None,
+    latency: float = 0.1,
 ) -> tuple[AbstractController[Any], AbstractSensor]:
-    """A controller within the robot's limits, and a camera that is late and noisy."""
+    """A controller within the robot's limits, and its eyes: else a simulated camera that is late and noisy."""
     import numpy as np
 
     from ..control import Camera, SimulatedSensor
     from ..control.tracking.simulated_run import TrackedRun
     from ..execution.run import slowed
 
-    if getattr(robot, "object", None) is None:
+    if eyes is None and getattr(robot, "object", None) is None:
         raise InputError(
             "a controller needs eyes, and this robot does not see the object",
-            hint="Give run() a controller and eyes in Python, or leave --controller out.",
+            hint="Give --camera and --tag, or run() a controller and eyes in Python, or leave --controller out.",
         )
     ticks = max(1, round(1 / (RATE * robot.limits.period)))
-    camera = Camera()
+    camera = Camera(latency=latency)
     tracked = TrackedRun(law, 1 / (ticks * robot.limits.period), camera=camera)
-    return tracked.law(slowed(plan, robot.limits, speed)), SimulatedSensor(
-        camera, np.random.default_rng(seed)
-    )
+    eyes = eyes or SimulatedSensor(camera, np.random.default_rng(seed))
+    return tracked.law(slowed(plan, robot.limits, speed)), eyes
 
 
 def _show(limits: Limits, course: Course, plan: Plan, speed: float) -> None:
