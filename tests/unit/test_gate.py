@@ -17,6 +17,8 @@ BLOCK = [(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)]
 
 
 def scene(kind):
+    if kind == "slides":
+        return fp.Scene(fp.Object(BLOCK, friction=0.0), (0.05, 0.02, 0.6))
     thing = fp.Object(BLOCK, friction=0.4)
     pushes = tuple(fp.Push(f"edge {k}", thing.outline.at(k, 0.5), 1) for k in (0, 1))
     planning = fp.Planning(iterations=1)
@@ -50,7 +52,7 @@ def two_pushes(asked):
 @pytest.fixture(scope="module")
 def documents():
     plans = {kind: two_pushes(scene(kind)) for kind in ("two", "planar", "walls")} | {
-        "one": fp.plan(scene("one"))
+        kind: fp.plan(scene(kind)) for kind in ("one", "slides")
     }
     return {kind: plan_document(plan) for kind, plan in plans.items()}
 
@@ -74,7 +76,7 @@ def edited(document, edit):
     d = copy.deepcopy(document)
     S = d["segments"]
     transits = [s for s in S if s["kind"] == "transit"]
-    push = next(s for s in S if s["kind"] == "push")
+    push = next(s for s in S if s["kind"] != "transit")
     names = {"d": d, "S": S, "push": push, "first": transits[0], "last": transits[-1], "np": np}
     names |= {
         "between": transits[1],
@@ -86,7 +88,7 @@ def edited(document, edit):
     return d
 
 
-@pytest.mark.parametrize("kind", ["one", "two", "planar", "walls"])
+@pytest.mark.parametrize("kind", ["one", "two", "planar", "walls", "slides"])
 def test_an_honest_plan_is_accepted_and_is_for_its_scene(documents, kind):
     plan = parse_plan(documents[kind])
     for report in (fp.verify(plan), fp.verify(plan, scene=scene(kind))):

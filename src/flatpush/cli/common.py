@@ -97,7 +97,7 @@ def tell_slow_way(plan: "Plan", runs: int = 1, rate: float | None = None) -> Non
     """
     from ..simulation.plant import Plant
 
-    moving = [push for push in plan.pushes if len(push.times) > 2]
+    moving = [push for push in plan.on_table if len(push.times) > 2]
     if not moving:
         return
     push, middle = moving[0], len(moving[0].times) // 2

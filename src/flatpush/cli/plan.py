@@ -165,7 +165,11 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     typer.echo(f"{scene.object.name}: {pose_text(scene.start)} → {pose_text(scene.goal)}")
     if not plan.segments:
         typer.echo("already there: the start is within the goal tolerance, nothing to push")
-    for segment in plan.pushes:
+    for segment in plan.on_table:
+        if segment.kind == "slide":
+            way = math.dist(segment.pusher[0, :2], segment.pusher[-1, :2])
+            typer.echo(f"push {segment.push}: slides ({1000 * way:.1f} mm)")
+            continue
         arcs = ", ".join(f"{a.turn} {cost_text(a.cost, scene.planning.cost)}" for a in segment.arcs)
         typer.echo(f"push {segment.push}: {segment.word} ({arcs})")
     typer.echo(
@@ -188,14 +192,8 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     if plan.segments:
         x, y, angle = certificate.goal_error
         typer.echo(
-            f"certificate: goal met within {error_text(math.hypot(x, y), None if scene.free_angle else angle)},"
-            f" friction margin {100 * certificate.friction_margin:.0f} % of μ"
-            f" ({certificate.friction_margin_degrees:.1f}°)"
-            + (
-                f", both contacts keep {100 * certificate.composite_margin:.0f} % of μ in reserve"
-                if certificate.composite_margin is not None
-                else f", a small error grows {growth_text(certificate.growth)}"
-            )
+            f"certificate: goal met within {error_text(math.hypot(x, y), None if scene.free_angle else angle)}"
+            + _margins(certificate)
             + (
                 f", clearance {1000 * certificate.clearance:.2f} mm"
                 if certificate.clearance is not None
@@ -207,3 +205,23 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     for path in written:
         if path is not None:
             typer.echo(f"wrote {path}")
+
+
+def _margins(certificate: Any) -> str:
+    """What a plan has in reserve; of slides, how far the end moves."""
+    told = ""
+    if certificate.friction_margin is not None:
+        told += f", friction margin {100 * certificate.friction_margin:.0f} % of μ"
+        told += f" ({certificate.friction_margin_degrees:.1f}°)"
+    if certificate.composite_margin is not None:
+        told += f", both contacts keep {100 * certificate.composite_margin:.0f} % of μ in reserve"
+    elif certificate.growth is not None:
+        told += f", a small error grows {growth_text(certificate.growth)}"
+    if certificate.sensitivity is not None:
+        off = certificate.sensitivity
+        told += (
+            f"; the end moves by up to {off['place']:.1f} mm for each mm that the start is off,"
+            f" {1000 * math.radians(off['turn']):.2f} mm for each degree, {10 * off['friction']:.2f} mm for 0.01 of"
+            f" friction, {off['centre']:.1f} mm for each mm of the centre of friction"
+        )
+    return told

@@ -223,7 +223,7 @@ def _show(limits: Limits, course: Course, plan: Plan, speed: float) -> None:
     seconds = course.times[last] - course.times[0]
     typer.echo(f"first approach: from {here} up, over and down to {there}, {seconds:.1f} s", err=True)
     typer.echo(
-        f"then {len(plan.pushes)} push{'es' if len(plan.pushes) > 1 else ''}, {plan.duration / speed:.1f} s",
+        f"then {len(plan.on_table)} push{'es' if len(plan.on_table) > 1 else ''}, {plan.duration / speed:.1f} s",
         err=True,
     )
 

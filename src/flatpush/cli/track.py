@@ -129,8 +129,9 @@ def command(
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     distance, turn = goal_error(loaded, run.object[-1])
+    how = "slides" if loaded.slides else controller
     result = {
-        "controller": controller,
+        "controller": how,
         "outcome": run.outcome,
         "final_pose": [float(x) for x in run.object[-1]],
         "distance": distance,
@@ -144,7 +145,7 @@ def command(
         from ..view.track_figure import track_figure
 
         beside = "" if run.outcome.startswith(BESIDE) else f", off the goal by {error_text(distance, turn)}"
-        title = f"{controller} at {rate:g} Hz: {run.outcome}{beside}"
+        title = f"{how} at {rate:g} Hz: {run.outcome}{beside}"
         track_figure(loaded, run, figure, title)
     if as_json:
         print_json(result)

@@ -88,7 +88,7 @@ def export_rapid(
     lines = [
         "MODULE flatpush",
         *([f"  ! {_warning(unverified).encode('ascii', 'replace').decode()}"] if unverified else []),
-        f"  ! {name[:60]}: {len(plan.pushes)} pushes, {times[-1]:.1f} s; lengths in mm",
+        f"  ! {name[:60]}: {len(plan.on_table)} pushes, {times[-1]:.1f} s; lengths in mm",
         "  ! Midway between the fingertips, z down, x along the push: set it to your tool.",
         "  PERS tooldata flatpush_tool:=[TRUE,[[0,0,100],[1,0,0,0]],[0.5,[0,0,50],[1,0,0,0],0,0,0]];",
         f'  PERS wobjdata flatpush_table:=[FALSE,TRUE,"",[[{x:.4f},{y:.4f},{z:.4f}],[{c:.8f},0,0,{s:.8f}]],'

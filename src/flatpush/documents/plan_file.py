@@ -12,9 +12,16 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from ..problem import Arc, CarCentres, Certificate, Plan, PushSegment, TransitSegment
+from ..problem import Arc, CarCentres, Certificate, Plan, PushSegment, Segment, SlideSegment, TransitSegment
 from .atomic import write_atomically
-from .plan_model import CertificatePart, NoCertificatePart, PlanModel, PushSegmentPart, TransitSegmentPart
+from .plan_model import (
+    CertificatePart,
+    NoCertificatePart,
+    PlanModel,
+    PushSegmentPart,
+    SlideSegmentPart,
+    TransitSegmentPart,
+)
 from .reading import join, plain, read_mapping
 from .refusals import checked
 from .scene_digest import scene_digest
@@ -111,9 +118,18 @@ def finite_list(values: ArrayLike, key: str) -> list[object]:
     return array.tolist()
 
 
-def _segment(segment: PushSegment | TransitSegment, key: str) -> dict[str, Any]:
+def _segment(segment: Segment, key: str) -> dict[str, Any]:
     if isinstance(segment, TransitSegment):
         return {"kind": "transit", **_lists(segment, key, "times", "pusher", "height")}
+    if isinstance(segment, SlideSegment):
+        return {
+            "kind": "slide",
+            "push": segment.push,
+            **_lists(segment, key, "times", "object", "pusher", "fingers", "end"),
+            "sensitivity": {
+                name: _finite(value, join(key, "sensitivity")) for name, value in segment.sensitivity.items()
+            },
+        }
     arcs = [
         {
             "turn": arc.turn,
@@ -137,8 +153,8 @@ def _lists(segment: Any, key: str, *names: str) -> dict[str, list[object]]:
 
 
 def _read_segment(
-    part: PushSegmentPart | TransitSegmentPart, key: str, source: str
-) -> PushSegment | TransitSegment:
+    part: PushSegmentPart | SlideSegmentPart | TransitSegmentPart, key: str, source: str
+) -> Segment:
     hint = "The file was changed: plan again."
     count = len(part.times)
     if part.times[0] != 0 or any(b < a for a, b in zip(part.times, part.times[1:], strict=False)):
@@ -164,6 +180,16 @@ def _read_segment(
             times=np.array(part.times, dtype=float),
             pusher=np.array(part.pusher, dtype=float),
             height=np.array(part.height, dtype=float),
+        )
+    if isinstance(part, SlideSegmentPart):
+        return SlideSegment(
+            push=part.push,
+            times=np.array(part.times, dtype=float),
+            object=np.array(part.object, dtype=float),
+            pusher=np.array(part.pusher, dtype=float),
+            fingers=np.array(part.fingers, dtype=float),
+            end=np.array(part.end, dtype=float),
+            sensitivity=part.sensitivity.model_dump(),
         )
     return PushSegment(
         push=part.push,

@@ -35,6 +35,30 @@ class PushSegmentPart(Part):
     fingers: list[Vector2] = Field(min_length=1, max_length=2, description="Fingertip centres in E.")
 
 
+class SensitivityPart(Part):
+    """How far the outline's farthest point ends elsewhere, about, by what differs from the plan."""
+
+    place: Time = Field(description="If the object starts beside: m per m.")
+    turn: Time = Field(description="If it starts turned: m per rad.")
+    friction: Time = Field(description="By the coefficient between finger and object: m.")
+    centre: Time = Field(description="If the centre of friction lies beside: m per m.")
+
+
+class SlideSegmentPart(Part):
+    """The object pushed by one finger that goes straight, whatever the contact does."""
+
+    kind: Literal["slide"]
+    push: Text = Field(description="The name of the slide.")
+    times: list[Time] = Field(min_length=1, description="Seconds, from 0.")
+    object: list[Vector3] = Field(
+        description="Poses of the object at the times, as the simulator rolls them out."
+    )
+    pusher: list[Vector3] = Field(description="Poses of the pusher at the times.")
+    fingers: list[Vector2] = Field(min_length=1, max_length=1, description="The fingertip centre in E.")
+    end: Vector3 = Field(description="The object's pose after it, as predicted.")
+    sensitivity: SensitivityPart = Field(description="How far it ends elsewhere.")
+
+
 class TransitSegmentPart(Part):
     """The pusher alone."""
 
@@ -46,11 +70,13 @@ class TransitSegmentPart(Part):
 
 def _kind(value: Any) -> str:
     kind = value.get("kind") if isinstance(value, dict) else getattr(value, "kind", None)
-    return "<transit>" if kind == "transit" else "<push>"
+    return f"<{kind}>" if kind in ("transit", "slide") else "<push>"
 
 
 SegmentForm = Annotated[
-    Annotated[PushSegmentPart, Tag("<push>")] | Annotated[TransitSegmentPart, Tag("<transit>")],
+    Annotated[PushSegmentPart, Tag("<push>")]
+    | Annotated[SlideSegmentPart, Tag("<slide>")]
+    | Annotated[TransitSegmentPart, Tag("<transit>")],
     Discriminator(_kind),
 ]
 
@@ -89,6 +115,9 @@ class CertificatePart(BaseModel):
         default=None, description="The largest share by which loads may differ so that the plan still holds."
     )
     growth: Finite | None = Field(default=None, description="The factor by which a small error grows.")
+    sensitivity: SensitivityPart | None = Field(
+        default=None, description="Of a plan with slides: how far it ends elsewhere."
+    )
     clearance: Finite | None = Field(default=None, description="To obstacles and bounds.")
     cars: dict[str, CarPart] = Field(default_factory=dict, description="Of each push used, by its name.")
     warnings: list[str] = Field(default=[], description="In words.")
@@ -117,7 +146,7 @@ class PlanModel(Part):
     cost: Finite | None = Field(description="In the unit of the scene's cost; null without a plan.")
     duration: Time = Field(description="Seconds.")
     run: dict[str, Any] = Field(default_factory=dict, description="Version and planning time; not compared.")
-    segments: list[SegmentForm] = Field(description="Pushes and transits in order.")
+    segments: list[SegmentForm] = Field(description="Pushes, slides and transits in order.")
     certificate: CertificateForm = Field(
         default=NoCertificatePart(), description="What was proved or measured; empty without a plan."
     )

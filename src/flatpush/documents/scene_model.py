@@ -360,6 +360,10 @@ class PlanningPart(Part):
         default="set",
         description="Of an object with an uncertainty: pushes hold on every table of the set, or on the nominal one.",
     )
+    slides: Literal["auto", "join", "never"] = Field(
+        default="auto",
+        description="Pushes of one finger that slide: auto (where no push can steer), join (where cheaper) or never.",
+    )
     cost: Literal["flat", "pusher", "time"] = Field(default="flat", description="flat, pusher or time.")
     switch_cost: NotNegative | None = Field(
         default=None,

@@ -71,6 +71,7 @@ def scene_document(scene: Scene) -> dict[str, object]:
         "model": planning.model,
         "two_finger": planning.two_finger,
         **({"proof": planning.proof} if obj.uncertainty is not None else {}),
+        **({"slides": planning.slides} if planning.slides != "auto" else {}),
         "cost": planning.cost,
         "switch_cost": float(planning.switching),
         "margin": {"friction": float(planning.friction_margin), "clearance": float(planning.clearance)},

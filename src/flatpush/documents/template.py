@@ -64,6 +64,7 @@ planning:
   model: exact                    # friction with the table: exact, ellipsoid, local or quartic
   two_finger: cone                # cone: all that both fingers can do; middle: as one finger between them
   proof: set                      # of an object with an uncertainty: on every table of the set, or on the nominal one
+  slides: auto                    # pushes that slide: auto (where no push can steer), join (where cheaper) or never
   cost: flat                      # what is kept short: flat (path of the car), pusher (its path) or time
   switch_cost: 30                 # of each change of contact, in the unit of the cost; 0 for pusher and time
   margin:

@@ -141,7 +141,7 @@ def open_robot(address: str, plan: Plan, base: Sequence[float] | None = None) ->
         InputError: for an address that makes no sense. MissingExtra: for a robot whose library is not installed.
     """
     parsed = Address.parse(address, base)
-    if plan.status != "solved" or not plan.pushes:
+    if plan.status != "solved" or not plan.on_table:
         raise InputError(
             "there is no push to run in this plan", hint=plan.reason or "Start and goal are one."
         )

@@ -28,7 +28,8 @@ class Course:
         poses: (x, y, height, yaw), shape (n, 4).
         leg: of the step that ends at each pose, an index of `legs`, shape (n,).
         legs: names, such as "segment 1 (push long edge)".
-        pushes: for each leg the number in the scene, from 1, of its push or the one before; -1 before the plan begins.
+        pushes: for each leg the number in the scene, from 1, of its push or the one before (slides come last); -1
+            before the plan begins.
     """
 
     times: Array
@@ -121,12 +122,12 @@ def planned(plan: Plan, speed: float = 1.0, yaw: float | None = None) -> Course:
         raise InputError(
             "a plan is run at more than 0 and at most 1 times its speed", key="speed", value=speed
         )
-    if plan.status != "solved" or not plan.pushes:
+    if plan.status != "solved" or not plan.on_table:
         raise InputError(
             "there is no push to run in this plan", hint=plan.reason or "Start and goal are one."
         )
-    first = plan.pushes[0]
-    for push in plan.pushes:
+    first = plan.on_table[0]
+    for push in plan.on_table:
         if push.fingers.shape != first.fingers.shape or not np.allclose(
             push.fingers, first.fingers, atol=1e-9
         ):
@@ -135,8 +136,9 @@ def planned(plan: Plan, speed: float = 1.0, yaw: float | None = None) -> Course:
                 hint="A robot holds one tool: give all pushes the same fingers and spacing.",
             )
     listed = [push.name for push in plan.scene.pushes if not isinstance(push, str)]
-    last = 1 + listed.index(plan.pushes[0].push)
-    actions = {push.push: 1 + listed.index(push.push) for push in plan.pushes}
+    listed += [slide.push for slide in plan.slides]
+    last = 1 + listed.index(first.push)
+    actions = {push.push: 1 + listed.index(push.push) for push in plan.on_table}
     found: Course | None = None
     for number, segment in enumerate(plan.segments):
         if isinstance(segment, TransitSegment):

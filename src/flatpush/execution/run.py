@@ -188,7 +188,7 @@ def way(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     """
     tool = ready(robot).pose
     course = planned(plan, speed, float(tool[3]))
-    pusher, fingers = within(plan.scene.pusher, robot.limits, speed), plan.pushes[0].fingers
+    pusher, fingers = within(plan.scene.pusher, robot.limits, speed), plan.on_table[0].fingers
     first = approach(tool, course.poses[0], pusher.lift, pusher, float(np.max(np.hypot(*fingers.T))))
     whole = first.then(course)
     whole.check(robot.limits)
@@ -202,7 +202,7 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
         OutOfLimits: as way, for the plan's own way too: a controller's is near it.
     """
     whole = way(plan, robot, speed)
-    tool, first = ready(robot).pose, plan.pushes[0]
+    tool, first = ready(robot).pose, plan.on_table[0]
     pusher, reach = within(plan.scene.pusher, robot.limits, speed), float(np.max(np.hypot(*first.fingers.T)))
     behind = compose(first.pusher[0], [-2 * pusher.approach, 0.0, 0.0])
     turned = behind[2] + whole.poses[-1, 3] - planned(plan).poses[-1, 3]

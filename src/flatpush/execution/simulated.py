@@ -137,7 +137,7 @@ class SimRobot(DryRun):
         self._beside = np.append(tool, 0.0)
         scene = plan.scene
         self._plant = Plant(
-            scene.object, plan.pushes[0].fingers, scene.pusher.tip_radius, friction=unknown.friction
+            scene.object, plan.on_table[0].fingers, scene.pusher.tip_radius, friction=unknown.friction
         )
         self.object: Array = scene.start_pose + off
         self._touching: PlantState | None = None

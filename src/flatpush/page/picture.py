@@ -59,6 +59,8 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
             rows.append((name, _percent(value) + (" of μ" if name.startswith("both") else "")))
     if certificate.growth is not None:
         rows.append(("a small error grows", f"{certificate.growth:.3g}-fold"))
+    if certificate.sensitivity is not None:
+        rows.append(("a start beside moves the end", f"{certificate.sensitivity['place']:.1f}-fold"))
     if certificate.clearance is not None:
         rows.append(("clearance", f"{MM * certificate.clearance:.2f} mm"))
     return rows
@@ -81,7 +83,7 @@ def _trace(trace: PushTrace) -> dict[str, object]:
     return {
         "name": trace.segment.push,
         "label": words.push_label(trace.number, trace.segment, True),
-        "word": trace.segment.word,
+        "word": words.word_of(trace.segment),
         "ghosts": _mm(trace.marks * [MM, MM, 1.0], 4),
         "tips": _mm(MM * fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2), 2),
         "flat": None if trace.flat_path is None else _mm(MM * trace.flat_path, 2),

@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..geometry import relative
-from ..problem import PushSegment, Scene, TransitSegment
+from ..problem import PushSegment, Scene, Segment, SlideSegment, TransitSegment
 from ..steering.car import Car
 from .options import PushOption
 from .path import Path
@@ -15,8 +15,8 @@ from .rolling import rolling_segment
 from .segments import arcs_of, fingertips, push_segment
 from .transits import Transits
 
-Segment = TypeVar("Segment", PushSegment, TransitSegment)
-Segments = tuple[PushSegment | TransitSegment, ...]
+Moved = TypeVar("Moved", PushSegment, SlideSegment, TransitSegment)
+Segments = tuple[Segment, ...]
 
 
 def car_of(option: PushOption) -> Car:
@@ -31,7 +31,7 @@ def assemble(scene: Scene, transits: Transits, options: Sequence[PushOption], pa
     Raises:
         FlatpushError: if the pusher has no way between two pushes, or a finger that keeps its direction rolls off.
     """
-    segments: list[PushSegment | TransitSegment] = []
+    segments: list[Segment] = []
     pose, hand, before = path.start, None, None
     for number, word, amounts, end in path.stretches:
         option = options[number]
@@ -59,7 +59,7 @@ def assemble(scene: Scene, transits: Transits, options: Sequence[PushOption], pa
     return tuple(segments)
 
 
-def following(segment: Segment, before: PushSegment | TransitSegment) -> Segment:
+def following(segment: Moved, before: Segment) -> Moved:
     """A segment with whole turns added to the pusher's yaw, so that it goes on from the segment before."""
     turns = round(float(before.pusher[-1, 2] - segment.pusher[0, 2]) / (2 * np.pi))
     whole = np.array([0.0, 0.0, 2 * np.pi * turns])

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,9 @@ from .fleets import fleet_of
 from .obstacles import check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
+
+if TYPE_CHECKING:
+    from .sliding import SlidePlanner
 
 APART = np.deg2rad(40)  # between two angles at a free goal that are searched for among obstacles
 # Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
@@ -57,12 +60,14 @@ class Planner:
 
     def __init__(self, scene: Scene, progress: Progress | None = None) -> None:
         self.left_out: tuple[PushOption, ...] = ()
-        if scene.pushes == "auto":
+        anywhere = scene.pushes == "auto"
+        if anywhere:
             pushes, self.left_out = automatic_pushes(scene)
             scene = replace(scene, pushes=pushes or "auto")
         self.scene = scene
         self.options = () if scene.pushes == "auto" else push_options(scene)
         self.usable = tuple(option for option in self.options if option.car is not None)
+        self._anywhere = anywhere
         self._progress = progress
         self._among: AmongObstacles | None = None
 
@@ -115,6 +120,15 @@ class Planner:
             return
         if not self.usable:
             reason = f"no push can steer the object.\n{_listed(self.reasons)}"
+            if self._slides_too:
+                slid = list(self._slides(scene, began, np.inf))
+                yield from slid
+                if slid:
+                    return
+                why = self.sliding.refusal(scene.start_pose, scene.goal_pose)
+                reason = (
+                    f"no push can steer the object, and of pushes that slide: {why}.\n{_listed(self.reasons)}"
+                )
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
         best, stopped_by, details = np.inf, "", dict[str, Any]()
@@ -143,9 +157,44 @@ class Planner:
                 yield Answer(best, partial(_solved, scene, segments, began, details), details)
         if stopped_by == "time_limit":
             details["stopped_by"] = stopped_by  # of the last answer, whose plan is yet to be made
+        if self._slides_too:
+            for answer in self._slides(scene, began, best):
+                best = answer.cost
+                yield answer
         if np.isinf(best):
             lines = (blocked.strip(), _listed(reasons))
             yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
+
+    @property
+    def _slides_too(self) -> bool:
+        """Whether pushes that slide may be in a plan of this scene."""
+        wanted, one = self.scene.planning.slides, self.scene.pusher.fingers == 1
+        return one and (wanted == "join" or (wanted == "auto" and self._anywhere and not self.usable))
+
+    @cached_property
+    def sliding(self) -> "SlidePlanner":
+        """Plans pushes that slide, whatever start and goal."""
+        from .sliding import slide_planner
+
+        return slide_planner(self.scene)
+
+    def _slides(self, scene: Scene, began: float, below: float) -> Iterator[Answer]:
+        """The cheapest plan of pushes that slide, if it costs less than this."""
+        from .sliding import slide_plans, slide_segments
+
+        plans = []
+        for found in slide_plans(self.sliding, scene):
+            plans.append(found)
+            if clock() - began > scene.planning.time_limit:
+                break
+        for found in reversed(plans):
+            plan = _solved(scene, slide_segments(scene, found.pushes), began, {})
+            assert plan.certificate is not None
+            clear = plan.certificate.clearance  # the way of the hand between the pushes included
+            if clear is None or clear >= scene.planning.clearance:
+                if plan.cost < below:
+                    yield Answer(plan.cost, partial(_again, plan))
+                return
 
     @property
     def explored(self) -> Array | None:
@@ -247,6 +296,10 @@ def _solved(scene: Scene, segments: Segments, began: float, found: dict[str, Any
 
 def _none(scene: Scene, reason: str, began: float) -> Plan:
     return Plan("no_plan", scene, reason=reason, run=_run(began))
+
+
+def _again(plan: Plan) -> Plan:
+    return plan
 
 
 def _run(began: float) -> dict[str, Any]:

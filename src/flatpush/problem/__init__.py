@@ -1,7 +1,7 @@
 """What is asked and what is answered, as plain values."""
 
 from .certificate import CarCentres, Certificate
-from .plan import Arc, Plan, PushSegment, Rollout, TransitSegment
+from .plan import Arc, Plan, PushSegment, Rollout, Segment, SlideSegment, TableSegment, TransitSegment
 from .scene import Object, Planning, Push, Pusher, Scene, Uncertainty, Workspace
 
 __all__ = [
@@ -16,6 +16,9 @@ __all__ = [
     "Pusher",
     "Rollout",
     "Scene",
+    "Segment",
+    "SlideSegment",
+    "TableSegment",
     "TransitSegment",
     "Uncertainty",
     "Workspace",

@@ -54,6 +54,9 @@ class Certificate:
         set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
             offset of that set.
         growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.
+        sensitivity: plans with slides: how far the outline's farthest point ends elsewhere, about, if the object starts
+            beside ("place") [m/m] or turned ("turn") [m/rad], the finger has more or less friction ("friction") [m],
+            or the centre of friction, and with it the pressure, lies beside ("centre") [m/m], in the worst direction.
         clearance: least distance to obstacles and bounds [m]; None without any.
         cars: of each push used, by its name.
         warnings: in words.
@@ -74,6 +77,7 @@ class Certificate:
     set_margin: float | None = None
     set_loads: float | None = None
     growth: float | None = None
+    sensitivity: Mapping[str, float] | None = None
     clearance: float | None = None
     cars: Mapping[str, CarCentres] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

@@ -55,6 +55,30 @@ class PushSegment:
 
 
 @dataclass(frozen=True, eq=False)
+class SlideSegment:
+    """The object pushed by one finger that goes straight, whatever the contact does: it sticks, slides or lets go.
+
+    Attributes:
+        push: name of the slide.
+        times: from 0, shape (n,) [s].
+        object: poses X_WO as the plant rolls them out, shape (n, 3) [m, m, rad].
+        pusher: poses X_WE, shape (n, 3) [m, m, rad].
+        fingers: fingertip centre in E, shape (1, 2) [m].
+        end: X_WO that is predicted after it, shape (3,).
+        sensitivity: how far it ends elsewhere, as in Certificate.sensitivity [m/m, m/rad, m, m/m].
+    """
+
+    push: str
+    times: Array
+    object: Array
+    pusher: Array
+    fingers: Array
+    end: Array
+    sensitivity: Mapping[str, float]
+    kind: Literal["slide"] = "slide"
+
+
+@dataclass(frozen=True, eq=False)
 class TransitSegment:
     """The pusher alone.
 
@@ -70,6 +94,10 @@ class TransitSegment:
     kind: Literal["transit"] = "transit"
 
 
+TableSegment = PushSegment | SlideSegment
+Segment = TableSegment | TransitSegment
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A plan; its attributes are the keys of the plan document.
@@ -79,7 +107,7 @@ class Plan:
         scene: the scene as resolved: the pushes listed, every default filled in.
         cost: [m], or [s] where scene.planning.cost is "time"; nan without a plan.
         duration: [s].
-        segments: pushes and transits in order; empty when start and goal are equal.
+        segments: pushes, slides and transits in order; empty when start and goal are equal.
         certificate: what was proved or measured; None without a plan.
         reason: why there is no plan, and what to try.
         scene_digest: of the scene it was saved with, see documents.scene_digest; empty before that and in older plans.
@@ -91,7 +119,7 @@ class Plan:
     scene: Scene
     cost: float = float("nan")
     duration: float = 0.0
-    segments: tuple[PushSegment | TransitSegment, ...] = ()
+    segments: tuple[Segment, ...] = ()
     certificate: Certificate | None = None
     reason: str = ""
     scene_digest: str = ""
@@ -101,6 +129,15 @@ class Plan:
     def pushes(self) -> tuple[PushSegment, ...]:
         return tuple(s for s in self.segments if isinstance(s, PushSegment))
 
+    @property
+    def slides(self) -> tuple[SlideSegment, ...]:
+        return tuple(s for s in self.segments if isinstance(s, SlideSegment))
+
+    @property
+    def on_table(self) -> tuple[TableSegment, ...]:
+        """Pushes and slides in order: the segments in which the object moves."""
+        return tuple(s for s in self.segments if not isinstance(s, TransitSegment))
+
     def save(self, path: str | Path) -> None:
         """Writes the plan document (JSON, SI), whole or not at all."""
         from ..documents.plan_file import save_plan
@@ -109,7 +146,8 @@ class Plan:
 
     def final_pose(self) -> Array:
         """Where the plan leaves the object, X_WO, shape (3,)."""
-        return self.pushes[-1].object[-1] if self.pushes else np.asarray(self.scene.start, dtype=float)
+        moved = self.on_table
+        return moved[-1].object[-1] if moved else np.asarray(self.scene.start, dtype=float)
 
     @property
     def goal_pose(self) -> Array:

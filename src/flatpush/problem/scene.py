@@ -266,6 +266,8 @@ class Planning:
         iterations: how many the search makes at most.
         time_limit: after which the search is cut short [s].
         proof: of two fingers, where the object has an uncertainty.
+        slides: whether one finger may push whatever the contact does: "auto", anywhere on the outline where no push of
+            "auto" ones can steer; "join", also where some can, if that is cheaper; "never".
     """
 
     model: Model = "exact"
@@ -280,6 +282,7 @@ class Planning:
     iterations: int = 10000
     time_limit: float = 5.0
     proof: Literal["set", "nominal"] = "set"
+    slides: Literal["auto", "join", "never"] = "auto"
 
     @property
     def switching(self) -> float:
@@ -294,6 +297,7 @@ class Planning:
                 raise InputError(rule, key=f"planning.{key}", value=getattr(self, key))
 
         need(self.proof in ("set", "nominal"), "proof", "a proof is for the set or for the nominal table")
+        need(self.slides in ("auto", "join", "never"), "slides", "slides are auto, join or never")
         need(self.model in MODELS, "model", f"the model is one of {', '.join(MODELS)}")
         need(
             is_finite(self.friction_margin) and 0 <= self.friction_margin < 1,

@@ -8,7 +8,7 @@ from ..contact import PointContact, steering_forces
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, relative, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
-from ..problem import CarCentres, Certificate, PushSegment, Scene, TransitSegment
+from ..problem import CarCentres, Certificate, PushSegment, Scene, Segment, SlideSegment, TransitSegment
 from ..problem.mechanics import (
     cone_motions,
     contact_at,
@@ -25,12 +25,19 @@ from .cone_margins import cone_margins
 from .margins import Margins, contact_margins, two_finger_margins, worse_of
 from .pieces import progress, turns_along
 from .proof import proof_of
+from .slides import plant_of_slides, rolled_out, sensitivity_of
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
 TRUSTED_GROWTH = float(np.exp(4.0))
 
 
-def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> Certificate:
+# What every plan with slides is told with.
+LESS_CERTAIN = (
+    "pushes that slide are less certain than pushes that stick: look after each, as flatpush track does"
+)
+
+
+def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
     """The certificate of a plan, from its scene and its segments alone.
 
     Raises:
@@ -42,7 +49,18 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
     cars: dict[str, CarCentres] = {}
     judged: set[tuple[object, ...]] = set()
     cost, growth, previous = 0.0, None, None
-    for segment in pushes:
+    slides = any(isinstance(s, SlideSegment) for s in segments)
+    plant = plant_of_slides(scene) if slides else None
+    for segment in segments:
+        if isinstance(segment, TransitSegment):
+            continue
+        cost += scene.planning.switching if previous not in (None, segment.push) else 0.0
+        previous = segment.push
+        if isinstance(segment, SlideSegment):
+            assert plant is not None
+            pose = rolled_out(plant, pose, segment.pusher).object[-1]
+            cost += slide_cost(scene, segment)
+            continue
         placement = placement_of(scene, named(scene, segment.push))
         contact = virtual_contact(scene, placement)
         surface = surface_of(scene.object, scene.planning.model, -contact.point / np.hypot(*contact.point))
@@ -67,8 +85,6 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
                 found = worse_of(found, two_finger_margins(scene, placement, twist))
             worst = worse_of(worst, found)
         cost += sum(arc_costs(scene, segment, cars[segment.push]))
-        cost += scene.planning.switching if previous not in (None, segment.push) else 0.0
-        previous = segment.push
         for arc in segment.arcs:
             pose = compose(pose, exp(arc.duration * arc.twist))
         if len(segment.fingers) == 1:
@@ -98,9 +114,10 @@ def certify(scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> C
         set_margin=None if proof is None else proof.margin,
         set_loads=None if proof is None else proof.loads,
         growth=growth,
+        sensitivity=sensitivity_of(scene, segments),
         clearance=clearance_of(scene, segments),
         cars=cars,
-        warnings=tuple(_warnings(growth, worst)),
+        warnings=(*_warnings(growth, worst), *((LESS_CERTAIN,) if slides else ())),
     )
 
 
@@ -161,6 +178,13 @@ def arc_costs(scene: Scene, segment: PushSegment, car: CarCentres) -> list[float
             costs[arc] += float(step)
         return costs
     return [float(np.hypot(*velocity_at(arc.twist, point))) * arc.duration for arc in segment.arcs]
+
+
+def slide_cost(scene: Scene, segment: SlideSegment) -> float:
+    """Cost of a slide: the length of the finger's way, or its time."""
+    if scene.planning.cost == "time":
+        return float(segment.times[-1])
+    return float(np.sum(np.linalg.norm(np.diff(segment.pusher[:, :2], axis=0), axis=1)))
 
 
 def _transit_length(segment: TransitSegment) -> float:

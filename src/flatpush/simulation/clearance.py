@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..geometry import compose, exp, transform
 from ..geometry.pose import Array
-from ..problem import PushSegment, Scene, TransitSegment
+from ..problem import Scene, Segment, TransitSegment
 from .pieces import Piece, pieces
 
 # The least clearance is known to within this [m]; what is returned is the lower end.
@@ -17,9 +17,7 @@ PAIRS = 1_000_000  # of shapes and obstacles that are compared at a time
 Places = NDArray[np.intp]
 
 
-def clearance_of(
-    scene: Scene, segments: Sequence[PushSegment | TransitSegment], need: float = -np.inf
-) -> float | None:
+def clearance_of(scene: Scene, segments: Sequence[Segment], need: float = -np.inf) -> float | None:
     """The least distance [m] of object and fingertips to obstacles and bounds over a whole plan; None without either.
 
     A lower bound, at most 10 µm below the true value; the search ends early where less than `need` is found. Negative
@@ -54,8 +52,8 @@ def clearance_of(
 class _Motion:
     """All pieces of a plan, as arrays."""
 
-    def __init__(self, scene: Scene, segments: Sequence[PushSegment | TransitSegment]) -> None:
-        hands = [s.fingers for s in segments if isinstance(s, PushSegment)]
+    def __init__(self, scene: Scene, segments: Sequence[Segment]) -> None:
+        hands = [s.fingers for s in segments if not isinstance(s, TransitSegment)]
         listed: list[Piece] = []
         held: list[Array] = []
         push = 0

@@ -14,15 +14,18 @@ from numpy.typing import NDArray
 from ..contact import Placement
 from ..geometry import compose, exp, pose_error, relative, transform
 from ..geometry.pose import Array
-from ..problem import PushSegment, Scene, TransitSegment
+from ..problem import PushSegment, Scene, Segment, SlideSegment, TableSegment, TransitSegment
 from ..problem.mechanics import named, placement_of
 from .pieces import progress, turns_along
+from .plant import Plant
+from .slides import beside, plant_of_slides, rolled_out
 
-Segment = PushSegment | TransitSegment
 # Straight interpolation stays so near the arcs [m, rad].
 SAMPLING, SAMPLING_ANGLE = 5e-5, float(np.deg2rad(0.05))
 # Places agree to so much where one motion follows another [m, rad]; documents hold all digits.
 SAME = 1e-9
+# A slide rolled out again: other processors round a little differently [m, rad].
+ROLLED = 1e-6
 # A limit may be passed by this part, and by what the rounding of places (in parts of their size) makes of it.
 SLACK, ROUNDING = 1e-6, 1e-15
 # Between samples the hand is looked at after every turn of so much [rad]: for what is in the way, and for how fast the
@@ -70,8 +73,12 @@ def execution_findings(scene: Scene, segments: Sequence[Segment]) -> tuple[Findi
 def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
     yield from _order(segments)
     pose = scene.start_pose
-    yield from _wound(_pushes(segments)[:1], pose)
-    placements = {s.push: placement_of(scene, named(scene, s.push)) for s in _pushes(segments)}
+    yield from _wound(_on_table(segments)[:1], pose)
+    placements = {
+        s.push: placement_of(scene, named(scene, s.push)) for s in segments if isinstance(s, PushSegment)
+    }
+    slides = any(isinstance(s, SlideSegment) for s in segments)
+    plant = plant_of_slides(scene) if slides else None
     for k, segment in enumerate(segments):
         label = f"segment {k} ({segment.kind})"
         if k > 0:
@@ -84,6 +91,12 @@ def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
             for arc in segment.arcs:
                 pose = compose(pose, exp(arc.duration * arc.twist))
             hands = [segment.fingers]
+        elif isinstance(segment, SlideSegment):
+            assert plant is not None
+            yield from _starts(segment, pose, label)
+            yield from _slides(plant, segment, label)
+            pose = segment.object[-1]
+            hands = [segment.fingers]
         else:
             hands = [s.fingers for s in _neighbours(segments, k)]
             yield _turned(segment, label)
@@ -94,13 +107,13 @@ def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
             yield from _limits(scene, segment, hand, label)
 
 
-def _pushes(segments: Sequence[Segment]) -> list[PushSegment]:
-    return [s for s in segments if isinstance(s, PushSegment)]
+def _on_table(segments: Sequence[Segment]) -> list[TableSegment]:
+    return [s for s in segments if not isinstance(s, TransitSegment)]
 
 
-def _neighbours(segments: Sequence[Segment], k: int) -> list[PushSegment]:
-    """The pushes before and after a transit."""
-    return [*_pushes(segments[:k])[-1:], *_pushes(segments[k:])[:1]]
+def _neighbours(segments: Sequence[Segment], k: int) -> list[TableSegment]:
+    """The pushes or slides before and after a transit."""
+    return [*_on_table(segments[:k])[-1:], *_on_table(segments[k:])[:1]]
 
 
 def _order(segments: Sequence[Segment]) -> Iterator[Finding]:
@@ -108,13 +121,13 @@ def _order(segments: Sequence[Segment]) -> Iterator[Finding]:
     missing = 0 if not kinds else (kinds[0] != "transit") + (kinds[-1] != "transit")
     yield Finding("first and last transit missing", missing, 0, "", "the plan's ends")
     for k, (a, b) in enumerate(pairwise(segments)):
-        if isinstance(a, PushSegment) and isinstance(b, PushSegment):
+        if not isinstance(a, TransitSegment) and not isinstance(b, TransitSegment):
             yield Finding(
                 "changes of push without a transit", float(a.push != b.push), 0, "", f"segment {k + 1}"
             )
 
 
-def _wound(first: Sequence[PushSegment], pose: Array) -> Iterator[Finding]:
+def _wound(first: Sequence[TableSegment], pose: Array) -> Iterator[Finding]:
     """The yaw of the first push is within half a turn of the object's: later ones follow from it without a jump."""
     for push in first:
         away = DEGREES * abs(float(push.pusher[0, 2] - pose[2]))
@@ -147,7 +160,7 @@ def _clock(segment: Segment, label: str) -> Finding:
     return Finding("step back in time", *_most(back, "s", 0.0, label))
 
 
-def _starts(segment: PushSegment, pose: Array, label: str) -> Iterator[Finding]:
+def _starts(segment: TableSegment, pose: Array, label: str) -> Iterator[Finding]:
     # The angle as it stands: the object makes no turn between pushes.
     error = np.abs(segment.object[0] - pose)
     where = f"{label}, sample 0"
@@ -179,6 +192,27 @@ def _held(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
     for name, poses, near in (("samples", on, SAME), ("between samples", between, SAMPLING)):
         gaps = np.array([abs(outline.nearest(X[:2]).distance - radius) for X in poses])
         yield Finding(f"rolling fingertip off the outline, {name}", *_most(MM * gaps, "mm", MM * near, label))
+
+
+def _slides(plant: Plant, segment: SlideSegment, label: str) -> Iterator[Finding]:
+    """The plant, from where the slide begins, goes through its samples, and straight lines between stay near."""
+    apart = float(np.max(np.abs(segment.fingers)))
+    yield Finding("fingertips beside their places", MM * apart, MM * SAME, "mm", label)
+    begin, between = segment.object[0], np.empty((2 * len(segment.times) - 1, 3))
+    between[::2], between[1::2] = segment.pusher, _halfway(segment.pusher)
+    again, finer = rolled_out(plant, begin, segment.pusher), rolled_out(plant, begin, between)
+    yield Finding("slide that the simulator does not finish", float(again.outcome != ""), 0.0, "", label)
+    end = np.abs(segment.end - segment.object[-1])
+    yield Finding("slide ends beside what it predicts", MM * float(np.max(end)), MM * SAME, "mm", label)
+    straight = between.copy()
+    straight[::2], straight[1::2] = segment.object, _halfway(segment.object)
+    for what, run, poses, near, near_angle in (
+        ("samples beside the slide", again, segment.object, ROLLED, ROLLED),
+        ("straight lines between samples beside the slide", finer, straight, SAMPLING, SAMPLING_ANGLE),
+    ):
+        far, turned = beside(run, poses)
+        yield Finding(what, *_most(MM * far, "mm", MM * near, label))
+        yield Finding(f"{what}, turn", *_most(DEGREES * turned, "°", DEGREES * near_angle, label))
 
 
 def _halfway(poses: Array) -> Array:

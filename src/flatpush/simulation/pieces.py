@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry import compose, exp, pose_error, relative, wrap_angle
 from ..geometry.pose import Array
-from ..problem import PushSegment, TransitSegment
+from ..problem import PushSegment, Segment, TableSegment, TransitSegment
 
 Source = Literal["arcs", "samples"]
 
@@ -23,7 +23,7 @@ class Piece:
         object, object_step: X_WO at its start, and the displacement's body twist; on "samples" a step in W.
         pusher, pusher_step: X_WE and its displacement, alike.
         body: whether the steps are body twists (exact arcs), or straight steps (x, y, θ) in W.
-        push: index of the segment's push, or None in a transit.
+        push: index of the push or slide among Plan.on_table, or None in a transit.
         lifted: whether the pusher is off the table during all or part of it.
         height: the least height of the fingertips in it [m].
     """
@@ -55,15 +55,13 @@ class Piece:
         return np.array([c * vx - s * vy, s * vx + c * vy, w])
 
 
-def pieces(
-    segments: Sequence[PushSegment | TransitSegment], start: Array, source: Source = "arcs"
-) -> Iterator[Piece]:
+def pieces(segments: Sequence[Segment], start: Array, source: Source = "arcs") -> Iterator[Piece]:
     """The pieces of a plan in order.
 
     Args:
         start: X_WO where the first push finds the object.
         source: "arcs" takes each piece from the arcs' twists, exactly; "samples" goes straight from sample to sample,
-            as a robot controller does. Pushes whose pusher does not turn with the object have samples only.
+            as a robot controller does. Slides have samples only, and pushes whose pusher does not turn with the object.
     """
     clock, resting, push = 0.0, np.asarray(start, dtype=float), -1
     for segment in segments:
@@ -86,9 +84,10 @@ def pieces(
                 )
         else:
             push += 1
-            exact = source == "arcs" and turns_along(segment)
-            make = _from_arcs if exact else _from_samples
-            for i, (object_, object_step, pusher, pusher_step) in enumerate(make(segment)):
+            steps, arcs = _from_samples(segment), False
+            if isinstance(segment, PushSegment) and source == "arcs" and turns_along(segment):
+                steps, arcs = _from_arcs(segment), True
+            for i, (object_, object_step, pusher, pusher_step) in enumerate(steps):
                 yield Piece(
                     clock + t[i],
                     t[i + 1] - t[i],
@@ -96,7 +95,7 @@ def pieces(
                     object_step,
                     pusher,
                     pusher_step,
-                    exact,
+                    arcs,
                     push,
                     False,
                 )
@@ -110,7 +109,7 @@ def turns_along(segment: PushSegment) -> bool:
     return bool(np.all(np.abs(wrap_angle(drift - drift[0])) < 1e-6))
 
 
-def _from_samples(segment: PushSegment) -> Iterator[tuple[Array, Array, Array, Array]]:
+def _from_samples(segment: TableSegment) -> Iterator[tuple[Array, Array, Array, Array]]:
     for i in range(len(segment.times) - 1):
         yield (
             segment.object[i],

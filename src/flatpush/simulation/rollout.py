@@ -8,8 +8,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..friction.surface import LimitSurface
+from ..geometry import inverse, transform
 from ..geometry.pose import Array
-from ..problem import Plan, Rollout, Scene
+from ..problem import Plan, PushSegment, Rollout, Scene
 from ..problem.mechanics import named, placement_of, surface_of
 from ..problem.scene import Model
 from .corners import passed_a_corner
@@ -68,7 +69,8 @@ class Rolled:
     Attributes:
         final: X_WO at the end, shape (n, 3).
         outcomes: n words, as of a Rollout.
-        sticking: whether every finger stuck from its first touch in each push to the push's end, shape (n,).
+        sticking: whether every finger stuck from its first touch in each push to the push's end, shape (n,); slides do
+            not count.
         times, pusher: of the samples, shapes (m,) and (m, 3).
         object: X_WO at the samples, shape (n, m, 3); nan after the end of a run.
         modes: codes of plant.MODES, shape (n, m). Of two fingers: sticking where both stick, separation where one is
@@ -111,7 +113,7 @@ def roll(plan: Plan, scenes: Sequence[Scene], model: Model, source: Source) -> R
             for code in np.unique(runs.outcome[runs.outcome > 0]):
                 stopped = here[runs.outcome == code]
                 outcomes[stopped], going[stopped], sticking[stopped] = OUTCOMES[code], False, False
-            if stretch.push is not None:
+            if stretch.push is not None and isinstance(plan.on_table[stretch.push], PushSegment):
                 touched = np.logical_or.accumulate(touching, axis=1)
                 sticking[here] &= np.all(~touched | (runs.modes == STICKING), axis=(1, 2))
                 lost = here[~np.any(touching[:, -1], axis=1) & (runs.outcome == 0)]
@@ -137,8 +139,12 @@ def roll(plan: Plan, scenes: Sequence[Scene], model: Model, source: Source) -> R
 
 def _push(plan: Plan, scenes: Sequence[Scene], stretch: Stretch, q: Array, model: Model) -> Any:
     """The runs of one stretch on the table."""
-    segment = plan.pushes[stretch.fingers]
-    contact = placement_of(plan.scene, named(plan.scene, segment.push)).virtual_point
+    segment = plan.on_table[stretch.fingers]
+    if isinstance(segment, PushSegment):
+        contact = placement_of(plan.scene, named(plan.scene, segment.push)).virtual_point
+    else:
+        tip = transform(inverse(segment.object[0]), segment.pusher[0, :2])
+        contact = plan.scene.object.outline.nearest(tip).point
     surfaces = [_surface(scene, contact, model) for scene in scenes]
     thing = scenes[0].object
     plant = Plant(thing, segment.fingers, plan.scene.pusher.tip_radius, surface=surfaces[0])

@@ -15,8 +15,8 @@ class Stretch:
     """Part of the hand's way.
 
     Attributes:
-        push: index of the push it belongs to; None in a transit.
-        fingers: index of the push whose fingers it moves: in a transit those of the push before until the hand is
+        push: index of the push or slide it belongs to, among Plan.on_table; None in a transit.
+        fingers: index of the one whose fingers it moves: in a transit those of the push before until the hand is
             lifted, then those of the next.
         lifted: whether the hand is off the table.
         body: whether the hand goes from pose to pose with a constant body twist, or else straight in W.
@@ -37,7 +37,7 @@ def stretches(plan: Plan, source: Source) -> tuple[Stretch, ...]:
     found: list[Stretch] = []
     group: list[Piece] = []
     before, raised = -1, False  # the last push, and whether the hand was lifted since
-    last = len(plan.pushes) - 1
+    last = len(plan.on_table) - 1
 
     def close() -> None:
         if group:

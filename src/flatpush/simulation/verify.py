@@ -11,6 +11,7 @@ from ..errors import FlatpushError, InputError
 from ..problem import Certificate, Plan, Scene
 from .claims import arc_costs, certify
 from .execution import Finding, execution_findings
+from .slides import slide_sensitivity
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
 
@@ -82,6 +83,7 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
         _stated(f"word of {s.push}", s.word, "".join(a.turn[0].upper() for a in s.arcs)) for s in plan.pushes
     ]
     claims += [_arc_turns(plan), _arc_costs(plan, computed)]
+    claims += [_sensitivity(plan, k) for k in range(len(plan.slides))]
     goal = np.abs(computed.goal_error)
     tolerance = np.array(plan.scene.planning.goal_tolerance)
     excess = float(np.max(goal / tolerance))
@@ -155,6 +157,12 @@ def _agree(a: Any, b: Any) -> bool:
         near = max(ABSOLUTE, RELATIVE * max(abs(a), abs(b)))
         return bool(a == b or (math.isfinite(near) and abs(a - b) <= near))
     return bool(a == b)
+
+
+def _sensitivity(plan: Plan, number: int) -> Claim:
+    slide = plan.slides[number]
+    found = slide_sensitivity(plan.scene, slide)
+    return _stated(f"sensitivity of {slide.push}", dict(slide.sensitivity), found)
 
 
 def _arc_turns(plan: Plan) -> Claim:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..geometry import transform
-from ..problem import Plan, PushSegment, Rollout
+from ..problem import Plan, PushSegment, Rollout, TransitSegment
 from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Drawing, Look
 from .labels import Labels, along
 from .legend import EDGE, TITLE, Entry, draw_legend, draw_title, frame_and_legend, legend_height, title_height
 from .panel import BOTTOM, Panel
+from .plan_figure import SLIDING
 from .raster import Canvas
 from .table import (
     MM,
@@ -53,7 +54,7 @@ def draw_gif(plan: Plan, rollouts: Sequence[Rollout] = ()) -> bytes:
         for clip, item in _moving(panel, plan, timeline, float(time), speed).items():
             canvas.draw(item, clip)
         images.append(canvas.picture())
-    return _encode(images, len(plan.pushes))
+    return _encode(images, len(plan.on_table))
 
 
 def _background(plan: Plan, rollouts: Sequence[Rollout]) -> tuple[Drawing, Panel]:
@@ -84,6 +85,9 @@ def _background(plan: Plan, rollouts: Sequence[Rollout]) -> tuple[Drawing, Panel
             draw_object(panel, scene, pose, Look(colour, 0.6, opacity=0.22))
         if trace.flat_path is not None:
             panel.line(MM * trace.flat_path, Look(colour, 1.8, opacity=0.8), 3)
+        elif not isinstance(trace.segment, PushSegment):
+            way = transform(trace.segment.object, scene.object.cof)
+            panel.line(MM * way, Look(colour, 1.8, SLIDING, 0.8), 3)
     labels = Labels(panel, what_is_drawn(plan, traces))
     for trace in traces if several else ():
         path = MM * transform(trace.segment.object, scene.object.cof)
@@ -102,8 +106,8 @@ def _moving(panel: Panel, plan: Plan, timeline: Timeline, time: float, speed: in
     over = Panel(layer, panel.frame, panel.box)
     pose, pusher, height, number = timeline.at(time)
     colour = palette.START
-    if plan.segments and isinstance(plan.segments[number], PushSegment):
-        colour = palette.push_colour(sum(s.kind == "push" for s in plan.segments[:number]))
+    if plan.segments and not isinstance(plan.segments[number], TransitSegment):
+        colour = palette.push_colour(sum(s.kind != "transit" for s in plan.segments[:number]))
     draw_object(over, scene, pose, Look(colour, 2.2), 10)
     over.line(MM * transform(pose, orientation_mark(scene)), Look(colour, 1.6), 11)
     if timeline.moves:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..geometry import transform
 from ..geometry.pose import Array
-from ..problem import Plan, PushSegment, Rollout, Scene
+from ..problem import Plan, PushSegment, Rollout, Scene, TransitSegment
 from . import palette
 from .drawing import Box, Drawing
 from .labels import Labels, beside
@@ -58,7 +58,7 @@ def plan_data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
     segments: list[dict[str, object]] = []
     pushes = iter(traces)
     for number, (start, segment) in enumerate(zip(timeline.starts, plan.segments, strict=True)):
-        row = _push(next(pushes), start) if isinstance(segment, PushSegment) else {"push": None}
+        row = {"push": None} if isinstance(segment, TransitSegment) else _push(next(pushes), start)
         tips = _round(MM * fingers_at(plan, number), 4)
         segments.append({"start": round(start, 6), **row, "tips": tips})
     return {
@@ -73,7 +73,9 @@ def plan_data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
 
 def _push(trace: PushTrace, start: float) -> dict[str, object]:
     turns, end = [], start
-    for arc, pose in zip(trace.segment.arcs, arc_starts(trace.segment), strict=False):
+    segment = trace.segment
+    arcs = zip(segment.arcs, arc_starts(segment), strict=False) if isinstance(segment, PushSegment) else ()
+    for arc, pose in arcs:
         end += arc.duration
         centre = turning_centre(arc)
         where = None if centre is None else _round(MM * transform(pose, centre), 3)
@@ -110,6 +112,9 @@ def _still(plan: Plan, traces: tuple[PushTrace, ...], rollouts: Sequence[Rollout
             parts += [f'<circle class="trail" {_at(tip)} r="{_tip(scene):.3f}"/>' for tip in tips]
         if trace.flat_path is not None:
             parts.append(f'<path class="flat" d="{_path(trace.flat_path)}"/>')
+        elif not isinstance(trace.segment, PushSegment):
+            way = transform(trace.segment.object, scene.object.cof)
+            parts.append(f'<path class="flat slide" d="{_path(way)}"/>')
         parts.append("</g>")
     for trace in traces if len(traces) > 1 else ():
         path = trace.flat_path
@@ -214,7 +219,7 @@ def _tip(scene: Scene) -> float:
 
 
 def _most_fingers(plan: Plan) -> int:
-    return max((len(push.fingers) for push in plan.pushes), default=0)
+    return max((len(push.fingers) for push in plan.on_table), default=0)
 
 
 def _path(points: Array, closed: bool = False) -> str:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..geometry import inverse, rotate, transform
 from ..geometry.pose import Array
-from ..problem import Plan, PushSegment, Rollout, Scene, TransitSegment
+from ..problem import Plan, PushSegment, Rollout, Scene, TableSegment, TransitSegment
 from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Box, Drawing, Look
@@ -33,6 +33,7 @@ MOST_COLUMNS = 9
 CELL_HEIGHT = 68.0  # of the strip [pt]
 ALONE, LIFTED = (3.0, 2.0), (1.0, 2.5)  # dashes
 RUN = (4.0, 2.0)
+SLIDING = (2.5, 1.5)
 
 
 def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | None = None) -> Drawing:
@@ -73,7 +74,7 @@ def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | No
     for rollout in rollouts:
         _draw_rollout(panel, plan, rollout, traces, faint=len(rollouts) > 3)
     _draw_strip(
-        page, plan.scene, plan.pushes, *strip, wide / max(columns, 3 if wide > PAGE / 2 else 1), columns
+        page, plan.scene, plan.on_table, *strip, wide / max(columns, 3 if wide > PAGE / 2 else 1), columns
     )
     return page
 
@@ -108,7 +109,9 @@ def _draw_push(panel: Panel, plan: Plan, trace: PushTrace, labels: Labels) -> No
         if len(moving):
             panel.arrow(path[moving[-1]], path[-1], colour, 1.9, 7.1)
         panel.disc(path[0], 2.4, Look("#ffffff", 0.7, fill=colour), 7.2)
-    if len(plan.pushes) > 1:
+    if not isinstance(trace.segment, PushSegment):
+        panel.line(MM * first, Look(colour, 1.9, SLIDING), 7)
+    if len(plan.on_table) > 1:
         draw_number(panel.page, labels.place(13.0, 13.0, along(panel, MM * first), free=True), trace.number)
 
 
@@ -184,7 +187,7 @@ def _strip_height(cells: int, columns: int) -> float:
 def _draw_strip(
     page: Drawing,
     scene: Scene,
-    pushes: Sequence[PushSegment],
+    pushes: Sequence[TableSegment],
     left: float,
     top: float,
     cell: float,
@@ -202,7 +205,7 @@ def _draw_strip(
         _draw_cell(page, scene, push, number, (x, y, x + cell - 6, y + CELL_HEIGHT))
 
 
-def _draw_cell(page: Drawing, scene: Scene, push: PushSegment, number: int, cell: Box) -> None:
+def _draw_cell(page: Drawing, scene: Scene, push: TableSegment, number: int, cell: Box) -> None:
     """One push in a cell of the page: the object in its frame O with the fingers at its start, number and name."""
     landing = transform(inverse(push.object[0]), transform(push.pusher[0], push.fingers))
     ahead = rotate(push.pusher[0, 2] - push.object[0, 2], np.array([1.0, 0.0]))
@@ -220,7 +223,7 @@ def _draw_cell(page: Drawing, scene: Scene, push: PushSegment, number: int, cell
     draw_number(page, np.array([x, y]), number)
     room = cell[2] - x - 9
     page.add(d.Text(x + 9, y + 2.5, d.shortened(push.push, 7.5, room), 7.5, d.INK), 20)
-    page.add(d.Text(x + 9, y + 11.5, d.shortened(push.word, 7.0, room), 7.0, SOFT), 20)
+    page.add(d.Text(x + 9, y + 11.5, d.shortened(words.word_of(push), 7.0, room), 7.0, SOFT), 20)
 
 
 def _legend(plan: Plan, traces: Sequence[PushTrace], box: Box, simulated: bool, tree: bool) -> list[Entry]:
@@ -230,6 +233,10 @@ def _legend(plan: Plan, traces: Sequence[PushTrace], box: Box, simulated: bool, 
     if any(t.flat_path is not None for t in traces):
         colour = SOFT if several else palette.push_colour(0)
         entries.append(Entry(words.FLAT_PATH, Look(colour, 1.9)))
+    if any(not isinstance(t.segment, PushSegment) for t in traces):
+        entries.append(
+            Entry(words.SLIDE_PATH, Look(SOFT if several else palette.push_colour(0), 1.9, SLIDING))
+        )
     if traces:
         entries.append(Entry(words.FINGERS, Look(palette.PUSHER, 0.9), "line and dot"))
     if any(isinstance(s, TransitSegment) for s in plan.segments):

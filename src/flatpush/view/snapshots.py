@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry import transform
 from ..geometry.pose import Array
-from ..problem import Plan, PushSegment
+from ..problem import Plan, TransitSegment
 from . import drawing as d
 from . import palette, words
 from .drawing import PAGE, SOFT, Drawing, Look
@@ -66,7 +66,7 @@ def draw_snapshots(plan: Plan, count: int = 8) -> Drawing:
     entries = [
         Entry(words.START, Look(palette.START, 0.8, (2.0, 1.5)), "box"),
         Entry(words.GOAL, Look(palette.GOAL, 0.8, (2.0, 1.5)), "box"),
-        Entry(words.WAY, Look(palette.push_colour(0) if len(plan.pushes) == 1 else SOFT, 1.4)),
+        Entry(words.WAY, Look(palette.push_colour(0) if len(plan.on_table) == 1 else SOFT, 1.4)),
         *([Entry(words.FINGERS_ALONE, Look(palette.PUSHER, 1.0), "line and dot")] if timeline.moves else []),
         *workspace_entries(plan.scene),
     ]
@@ -106,7 +106,7 @@ def way_until(plan: Plan, timeline: Timeline, time: float) -> list[tuple[int, Ar
     found: list[tuple[int, Array]] = []
     pose, _, _, now = timeline.at(time)
     for segment, push in enumerate(plan.segments):
-        if segment > now or not isinstance(push, PushSegment):
+        if segment > now or isinstance(push, TransitSegment):
             continue
         gone = timeline.object[(timeline.segment == segment) & (timeline.times <= time)]
         poses = np.concatenate([gone, pose[None]]) if segment == now else gone

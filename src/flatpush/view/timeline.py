@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..geometry import compose, exp
 from ..geometry.pose import Array
-from ..problem import Plan, PushSegment
+from ..problem import Plan, PushSegment, SlideSegment, TransitSegment
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Timeline:
         times, objects, pushers, heights, numbers, starts = [], [], [], [], [], []
         for number, segment in enumerate(plan.segments):
             n = len(segment.times)
-            if isinstance(segment, PushSegment):
+            if not isinstance(segment, TransitSegment):
                 objects.append(segment.object)
                 heights.append(np.zeros(n))
             else:
@@ -90,6 +90,8 @@ def doing(plan: Plan, timeline: Timeline, time: float) -> str:
         return "at rest"
     _, _, height, number = timeline.at(time)
     segment = plan.segments[number]
+    if isinstance(segment, SlideSegment):
+        return f"push “{segment.push}”, whatever the contact does"
     if not isinstance(segment, PushSegment):
         return "pusher lifted" if height > 1e-6 else "pusher alone"
     left = time - timeline.starts[number]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..geometry import compose, exp, transform
 from ..geometry.pose import Array
-from ..problem import Arc, Plan, PushSegment, Rollout, Scene
+from ..problem import Arc, Plan, PushSegment, Rollout, Scene, TableSegment, TransitSegment
 from .timeline import Timeline, arc_starts
 
 MOST_MARKS = 36  # more outlines than this, and none of them can be told apart
@@ -14,7 +14,7 @@ MOST_MARKS = 36  # more outlines than this, and none of them can be told apart
 
 @dataclass(frozen=True, eq=False)
 class PushTrace:
-    """One push of a plan, ready to be drawn; lengths [m], in the table frame W unless it says O.
+    """One push or slide of a plan, ready to be drawn; lengths [m], in the table frame W unless it says O.
 
     Attributes:
         number: of the push in the plan, from 0.
@@ -29,7 +29,7 @@ class PushTrace:
     """
 
     number: int
-    segment: PushSegment
+    segment: TableSegment
     marks: Array
     pushers: Array
     flat_point: Array | None
@@ -43,12 +43,12 @@ class PushTrace:
 def trace_pushes(plan: Plan) -> tuple[PushTrace, ...]:
     """The trace of every push of a plan, in order. One interval of travel holds for the whole plan."""
     reach = 0.5 * plan.scene.object.outline.size
-    travels = [_travel(s.object, plan.scene.object.cof, reach) for s in plan.pushes]
+    travels = [_travel(s.object, plan.scene.object.cof, reach) for s in plan.on_table]
     total = sum(float(t[-1]) for t in travels)
     step = max(0.6 * reach, total / MOST_MARKS)
     return tuple(
         _trace(plan, number, segment, travel, step)
-        for number, (segment, travel) in enumerate(zip(plan.pushes, travels, strict=True))
+        for number, (segment, travel) in enumerate(zip(plan.on_table, travels, strict=True))
     )
 
 
@@ -61,7 +61,7 @@ def fingers_at(plan: Plan, number: int) -> Array:
     """Fingertips in E, shape (k, 2), in a segment: its own, or of the push it leads to, else of the one before."""
     segments = plan.segments
     for segment in (*segments[number:], *reversed(segments[:number])):
-        if isinstance(segment, PushSegment):
+        if not isinstance(segment, TransitSegment):
             return segment.fingers
     return np.zeros((0, 2))
 
@@ -69,7 +69,7 @@ def fingers_at(plan: Plan, number: int) -> Array:
 def rollout_paths(rollout: Rollout, plan: Plan, traces: tuple[PushTrace, ...]) -> list[Array]:
     """A simulated run beside the plan: paths of the same flat points, else of the centre of friction."""
     starts = [
-        start for start, s in zip(Timeline.of(plan).starts, plan.segments, strict=True) if s.kind == "push"
+        start for start, s in zip(Timeline.of(plan).starts, plan.segments, strict=True) if s.kind != "transit"
     ]
     paths = []
     for start, trace in zip(starts, traces, strict=True):
@@ -92,13 +92,15 @@ def turning_centre(arc: Arc) -> Array | None:
     return None if arc.turn == "straight" or w == 0 else np.array([-vy / w, vx / w])
 
 
-def _trace(plan: Plan, number: int, segment: PushSegment, travel: Array, step: float) -> PushTrace:
+def _trace(plan: Plan, number: int, segment: TableSegment, travel: Array, step: float) -> PushTrace:
     intervals = max(1, round(float(travel[-1]) / step))
     wanted = np.linspace(0.0, travel[-1], intervals + 1)
     marks, pushers = (
         np.stack([np.interp(wanted, travel, column) for column in poses.T], axis=1)
         for poses in (segment.object, segment.pusher)
     )
+    if not isinstance(segment, PushSegment):
+        return PushTrace(number, segment, marks, pushers, None, None, (), None, None, None)
     turning = _turning_centres(plan, segment)
     flat = None if turning is None else turning.mean(axis=0)
     contact = normal = motion = None

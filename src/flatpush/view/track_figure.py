@@ -81,7 +81,7 @@ def draw_track(plan: Plan, run: ClosedLoopRun, subtitle: str = "") -> Drawing:
     draw_workspace(table, scene)
     draw_endpoints(table, plan, Labels(table, np.concatenate([what_is_drawn(plan, traces), actual])))
     draw_object(table, scene, run.object[-1], Look(palette.SIMULATED, 1.0), 6)
-    for push in plan.pushes:
+    for push in plan.on_table:
         table.line(MM * transform(push.object, scene.object.cof), REFERENCE, 4)
     table.line(actual, ACTUAL, 7)
 
@@ -115,7 +115,7 @@ def distances(plan: Plan, run: ClosedLoopRun) -> Array:
     actual = transform(run.object, cof)
     if _plans_anew(run):
         return np.linalg.norm(actual - transform(plan.goal_pose, cof), axis=1)
-    paths = [_distance(actual, transform(push.object, cof)) for push in plan.pushes]
+    paths = [_distance(actual, transform(push.object, cof)) for push in plan.on_table]
     return np.asarray(np.min(paths, axis=0))
 
 

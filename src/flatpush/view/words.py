@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..problem import Plan, PushSegment
+from ..geometry import transform
+from ..problem import Plan, PushSegment, TableSegment
 
 START, GOAL, BOTH = "start", "goal", "start = goal"
 FLAT_PATH = "path of the flat point"
@@ -14,6 +15,7 @@ FRICTION_CONE, MOTION_CONE = "friction cone", "motion cone in use"
 CONTACT, CONTROLLER = "contact", "controller"
 STICKS, SLIDES_LEFT, SLIDES_RIGHT = "sticks", "slides to the left", "slides to the right"
 OFF, RESTS = "off the object", "at rest"
+SLIDES, SLIDE_PATH = "slides", "slides: path of the centre of friction"
 STRIP = "Fingers on the object, in order"
 BOUNDS, OBSTACLE, TREE, SIMULATED = "bounds", "obstacle", "search tree", "simulated"
 
@@ -23,7 +25,7 @@ def plan_title(plan: Plan) -> str:
     name = plan.scene.object.name
     if plan.status != "solved":
         return f"{name}: no plan"
-    pushes = plan.pushes
+    pushes = plan.on_table
     if not pushes:
         return f"{name}: nothing to push"
     count = "one push" if len(pushes) == 1 else f"{len(pushes)} pushes"
@@ -34,7 +36,7 @@ def plan_subtitle(plan: Plan) -> str:
     """The cost and where it comes from; without a plan the reason."""
     if plan.status != "solved":
         return plan.reason or "no reason was recorded"
-    changes = max(len(plan.pushes) - 1, 0)
+    changes = max(len(plan.on_table) - 1, 0)
     switching = plan.scene.planning.switching
     text = f"cost {cost_text(plan)}"
     if changes and switching > 0:
@@ -51,13 +53,16 @@ def cost_text(plan: Plan) -> str:
 
 
 def travel(plan: Plan) -> float:
-    """How far the centre of friction goes [m], arc by arc: |v + ω × p| is constant along an arc."""
+    """How far the centre of friction goes [m], arc by arc: |v + ω × p| is constant along an arc; slides by samples."""
     x, y = plan.scene.object.cof
     total = 0.0
     for push in plan.pushes:
         for arc in push.arcs:
             vx, vy, w = (float(v) for v in arc.twist)
             total += arc.duration * float(np.hypot(vx - w * y, vy + w * x))
+    for slide in plan.slides:
+        way = transform(slide.object, plan.scene.object.cof)
+        total += float(np.sum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
     return total
 
 
@@ -66,8 +71,13 @@ def length_text(length: float) -> str:
     return f"{length:.2f} m" if length >= 1 else f"{1e3 * length:.0f} mm"
 
 
-def push_label(number: int, push: PushSegment, several: bool) -> str:
+def word_of(push: TableSegment) -> str:
+    """The word of a push, or what a slide is."""
+    return push.word if isinstance(push, PushSegment) else SLIDES
+
+
+def push_label(number: int, push: TableSegment, several: bool) -> str:
     """A push in a legend."""
     name = push.push if len(push.push) <= 32 else push.push[:31] + "…"
-    text = f"push “{name}”, {push.word}"
+    text = f"push “{name}”, {word_of(push)}"
     return f"{number + 1}: {text}" if several else text

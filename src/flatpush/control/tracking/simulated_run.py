@@ -18,6 +18,7 @@ from ..loop.closed_loop import ClosedLoopRun, drive
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.sensor import Camera, SimulatedSensor
 from .plan_controller import BESIDE, PlanController, beside, check_pushes, goal_error
+from .slides import slide_by_slide
 
 Law = Literal["path", "dfl", "horizon"]
 Timing = Literal["even", "plan"]
@@ -58,7 +59,7 @@ class TrackedRun:
         Raises:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
-        run = drive(*self.parts(plan), self.patience(plan), told=told)
+        run = self._slid(plan) if plan.slides else drive(*self.parts(plan), self.patience(plan), told=told)
         return replace(run, outcome=self.judged(plan, run.outcome, run.object[-1]))
 
     def judged(self, plan: Plan, outcome: str, pose: Array) -> str:
@@ -89,6 +90,19 @@ class TrackedRun:
         hand = compose(first.pusher[0], [-2 * scene.pusher.approach, 0.0, 0.0])
         begin = scene.start_pose + np.array(self.start)
         return law, plant, begin, hand, SimulatedSensor(self.camera, np.random.default_rng(self.seed))
+
+    def _slid(self, plan: Plan) -> ClosedLoopRun:
+        """A plan with slides: look, push once, look and plan again."""
+        thing, off = plan.scene.object, np.array(self.centre)
+        table = replace(
+            thing,
+            friction=thing.friction if self.friction is None else self.friction,
+            support=thing.support.translated(off) if off.any() else thing.support,
+            uncertainty=None,
+        )
+        world = replace(plan.scene, object=table, start=plan.scene.start_pose + np.array(self.start))
+        sensor = SimulatedSensor(self.camera, np.random.default_rng(self.seed))
+        return slide_by_slide(plan, world, sensor, self._within(plan))
 
     def _within(self, plan: Plan) -> tuple[float, float]:
         goal = plan.scene.planning.goal_tolerance

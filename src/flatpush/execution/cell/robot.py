@@ -84,7 +84,7 @@ class CellRobot(DryRun):
         if table is not None:
             physics = Physics(friction, table, physics.tool)
         self._model = self._mujoco.MjModel.from_xml_string(
-            cell_xml(scene, plan.pushes[0].fingers, physics, arm)
+            cell_xml(scene, plan.on_table[0].fingers, physics, arm)
         )
         self._data = self._mujoco.MjData(self._model)
         if arm is not None and (why := arm.unreachable(self._pose)):

@@ -8,6 +8,7 @@ and a sequence of pushes is a product of displacements.
 from .exact import SlidePlan, SlidePlanner, SlidePush
 from .sequences import Sequence, SlideSearch
 from .slides import SlideLibrary, slide_library
+from .timed import slide_planner, slide_plans, slide_segments
 
 __all__ = [
     "Sequence",
@@ -17,4 +18,7 @@ __all__ = [
     "SlidePush",
     "SlideSearch",
     "slide_library",
+    "slide_planner",
+    "slide_plans",
+    "slide_segments",
 ]

@@ -1,7 +1,7 @@
 """Plans of sliding pushes that end at their goal: sequences of a library, their pushes adjusted through the plant."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,10 @@ from ...geometry import compose, inverse, log, pose_error, relative, transform, 
 from ...geometry.collision import Body, World, path_clearance
 from ...geometry.outline import Outline
 from ...geometry.pose import Array
-from ...simulation.plant import Plant
+from ...problem import Pusher
+from ...simulation.plant import Plant, PlantRun
+from ...steering.time_law import Trapezoid
+from ..segments import SAG, SAG_ANGLE
 from ..transits import LEAST_GAP, Network
 from .sequences import SlideSearch
 from .slides import BEFORE, LENGTHS, STEEPEST, finger_way, slide_library
@@ -31,6 +34,7 @@ APPROACHES = 6  # pairs of pushes towards a goal that is out of reach
 STEADY = 2.0  # growth of a push that is planned with, see SlideLibrary.growth
 MOST_GROWTH = 10.0  # of a plan, see SlidePlan.growth
 SAMPLE = 0.002  # way of the finger between samples of a push [m]
+HALVINGS = 12  # of the steps between samples where the object's motion bends
 SWITCH = 0.03  # a push costs as much as so much way, by default [m]
 TURNS = 1e-6  # a push turns the object if by more [rad]
 
@@ -44,6 +48,7 @@ class SlidePush:
         way: of the fingertip's centre from its last push to this one on the table, (n, 2) in W; None: lifted.
         tip: its way while it pushes, shape (m, 2) in W [m].
         object: X_WO at each of its places, shape (m, 3), as the plant rolled them out.
+        times: at which it is there, from rest to rest, shape (m,) [s]; None: of a planner without a pusher.
     """
 
     edge: int
@@ -52,6 +57,7 @@ class SlidePush:
     length: float
     tip: Array
     object: Array
+    times: Array | None = None
     way: Array | None = None
 
 
@@ -85,6 +91,8 @@ class SlidePlanner:
         clearance: by so much [m].
         planar: whether the fingertip goes from push to push on the table, around the object, instead of lifted.
         switch_cost: of each change of contact [m].
+        pusher: whose speed and acceleration give the pushes their times; they then begin at least its approach distance
+            away, and samples are dense enough for straight interpolation.
 
     Raises:
         InputError: as slide_library does.
@@ -97,14 +105,15 @@ class SlidePlanner:
         clearance: float = 0.0,
         planar: bool = False,
         switch_cost: float = SWITCH,
+        pusher: Pusher | None = None,
     ) -> None:
-        self.plant, self.world = plant, world
+        self.plant, self.world, self.pusher = plant, world, pusher
         self.clearance, self.planar, self.switch_cost = clearance, planar, switch_cost
         self.outline = plant.thing.outline
-        self.slides = slide_library(plant.thing, plant).steady(STEADY)
+        self._room = max(BEFORE * self.outline.size, 0.0 if pusher is None else pusher.approach)
+        self.slides = slide_library(plant.thing, plant, before=self._room).steady(STEADY)
         self.search = SlideSearch(self.slides)
         self.turns = bool(np.max(np.abs(self.slides.displacement[:, 2])) > TURNS)
-        self._room = BEFORE * self.outline.size
         self._bodies = Body.of(self.outline), Body.of(Outline.circle(max(plant.tip_radius, 1e-9)))
 
     def plan(
@@ -115,18 +124,32 @@ class SlidePlanner:
         With `planar` and the place (2,) where the fingertip is, the first push has a way from there, too.
         """
         begin, end = np.array(start, dtype=float), np.array(goal, dtype=float)
-        if not self.turns and abs(wrap_angle(end[2] - begin[2])) > TURNS:
-            return SlidePlan(
-                "no_plan",
-                "no push of this finger turns the object: without friction its force goes through the centre of"
-                " friction wherever it touches",
-            )
         found = list(self.plans(begin, end, tries, tip))
-        return (
-            found[-1]
-            if found
-            else SlidePlan("no_plan", "no sequence of sliding pushes could be made to end at the goal")
-        )
+        return found[-1] if found else SlidePlan("no_plan", self.refusal(begin, end))
+
+    def refusal(self, start: ArrayLike, goal: ArrayLike) -> str:
+        """Why there is no plan from X_WO to X_WO, both (3,), where plans() gives none."""
+        turn = wrap_angle(np.asarray(goal, dtype=float)[2] - np.asarray(start, dtype=float)[2])
+        if not self.turns and abs(turn) > TURNS:
+            return (
+                "no push of this finger turns the object: without friction its force goes through the centre of"
+                " friction wherever it touches"
+            )
+        return "no sequence of sliding pushes could be made to end at the goal"
+
+    def continued(
+        self, pushes: Sequence[SlidePush], start: ArrayLike, goal: ArrayLike, tip: ArrayLike | None = None
+    ) -> SlidePlan | None:
+        """The same pushes adjusted from where the object is now; None where that is not possible.
+
+        After each push of a plan the rest of it is nearly right still; a new plan might begin all over.
+        """
+        numbers = np.array([(p.edge, p.along, p.direction, p.length) for p in pushes]).reshape(-1, 4)
+        moves = self._moves(numbers) if len(numbers) else None
+        if moves is None:
+            return None
+        at = None if tip is None else np.array(tip, dtype=float)
+        return self._adjusted(np.array(start, dtype=float), np.array(goal, dtype=float), numbers, moves, at)
 
     def plans(
         self, start: ArrayLike, goal: ArrayLike, tries: int = TRIES, tip: ArrayLike | None = None
@@ -135,6 +158,8 @@ class SlidePlanner:
         at = None if tip is None else np.array(tip, dtype=float)
         X_WO, goal_W = np.array(start, dtype=float), np.array(goal, dtype=float)
         slides = self.slides
+        if not self.turns and abs(wrap_angle(goal_W[2] - X_WO[2])) > TURNS:
+            return
         way: tuple[int, ...] = ()
         least, tried, effort = np.inf, 0, 0
         failed: Counter[int] = Counter()  # by number of pushes
@@ -146,7 +171,8 @@ class SlidePlanner:
                 if cost >= least or 2 * failed[len(numbers)] >= tries:
                     continue
                 tried, effort = tried + 1, effort + len(numbers)
-                plan = self._adjusted(np.array(start, dtype=float), goal_W, numbers, at)
+                begun, moves = self._parameters(numbers), slides.displacement[numbers]
+                plan = self._adjusted(np.array(start, dtype=float), goal_W, begun, moves, at)
                 failed[len(numbers)] += plan is None
                 if plan is not None and plan.cost < least:
                     least = plan.cost
@@ -169,9 +195,12 @@ class SlidePlanner:
         s = self.slides
         return np.column_stack([s.edge[numbers], s.along[numbers], s.direction[numbers], s.length[numbers]])
 
-    def _adjusted(self, start: Array, goal: Array, numbers: list[int], tip: Array | None) -> SlidePlan | None:
-        """A sequence made exact by Gauss and Newton's method, with the smallest changes; None if that fails."""
-        pushes, moves = self._parameters(numbers), self.slides.displacement[numbers]
+    def _adjusted(
+        self, start: Array, goal: Array, pushes: Array, moves: Array, tip: Array | None
+    ) -> SlidePlan | None:
+        """Pushes (n, 4) that move by (n, 3) made exact by Gauss and Newton's method, with the smallest changes; None if
+        that fails.
+        """
         target, scale = relative(start, goal), self._scale(pushes)
         miss, growth = self._miss(moves, target), np.inf
         for _ in range(ADJUSTMENTS):
@@ -280,10 +309,15 @@ class SlidePlanner:
         if ways is None:
             return None
         for (edge, along, direction, length), (begin, end) in zip(pushes, ways, strict=True):
-            count = 2 + int(np.linalg.norm(end - begin) / SAMPLE)
-            tip = transform(X_WO, begin + np.linspace(0.0, 1.0, count)[:, None] * (end - begin))
-            run = self.plant.follow(X_WO, np.column_stack([tip, np.zeros(count)]), push_out=False)
-            push = SlidePush(int(edge), along, direction, length, tip, run.object)
+            tip_ends = transform(X_WO, np.stack([begin, end]))
+            if self.pusher is None:
+                times = None
+                shares = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(end - begin) / SAMPLE))
+            else:
+                times, shares = self._timed(X_WO, tip_ends, self.pusher)
+            run = self._followed(X_WO, tip_ends, shares)
+            tip = tip_ends[0] + shares[:, None] * (tip_ends[1] - tip_ends[0])
+            push = SlidePush(int(edge), along, direction, length, tip, run.object, times)
             if self.planar and before is not None:
                 around = self._around(X_WO, before, tip[0])
                 if around is None:
@@ -294,6 +328,31 @@ class SlidePlanner:
             X_WO, before = run.object[-1], tip[-1]
             made.append(push)
         return made
+
+    def _followed(self, X_WO: Array, tip: Array, shares: Array) -> PlantRun:
+        """The plant under a finger that goes from one place to another, (2, 2), through shares of its way (m,)."""
+        places = tip[0] + shares[:, None] * (tip[1] - tip[0])
+        hand = np.column_stack([places, np.full(len(shares), np.arctan2(*(tip[1] - tip[0])[::-1]))])
+        return self.plant.follow(X_WO, hand, push_out=False)
+
+    def _timed(self, X_WO: Array, tip: Array, pusher: Pusher) -> tuple[Array, Array]:
+        """Times and shares of a push's way: dense where the object's motion bends, as when it is touched or let go."""
+        length = float(np.linalg.norm(tip[1] - tip[0]))
+        law = Trapezoid.along(length, np.inf, pusher.speed, pusher.acceleration)
+        times, shares = law.samples(float(np.sqrt(8 * SAG / law.acceleration)), 1 + int(length / SAMPLE))
+        for _ in range(HALVINGS):
+            halfway = 0.5 * (times[:-1] + times[1:])
+            both = np.empty(2 * len(times) - 1)
+            both[::2], both[1::2] = shares, 0.5 * (shares[:-1] + shares[1:])
+            poses = self._followed(X_WO, tip, both).object
+            sag = np.abs(pose_error(0.5 * (poses[:-2:2] + poses[2::2]), poses[1::2]))
+            bent = (np.hypot(sag[:, 0], sag[:, 1]) > SAG) | (sag[:, 2] > SAG_ANGLE)
+            if not bent.any():
+                break
+            times = np.sort(np.concatenate([times, halfway[bent]]))
+            shares = np.clip(law.travelled(times) / length, 0.0, 1.0)
+            shares[0], shares[-1] = 0.0, 1.0
+        return times, shares
 
     def _around(self, X_WO: Array, tip: Array, target: Array) -> Array | None:
         """The way of the fingertip on the table around the object at rest, (n, 2) in W; None if there is none."""

@@ -1,0 +1,178 @@
+"""Plans of pushes that slide, from scene to robot: planned, proved, followed, drawn; refused where nothing turns."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.control.tracking.simulated_run import TrackedRun
+from flatpush.documents import export_csv, parse_plan, plan_document, scene_document
+from flatpush.geometry import Outline, pose_error, transform
+from flatpush.simulation.plant import Plant
+
+BRICK = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
+
+
+def slippery(**changes) -> fp.Scene:
+    """A brick without friction; fields of the scene by their names."""
+    return replace(fp.Scene(fp.Object(BRICK, friction=0.0), (0.07, 0.03, 0.9)), **changes)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return fp.plan(slippery())
+
+
+def ends(plan, pose, friction=0.0, cof=None):
+    """Where the slides of a plan take the object from a pose: a plant of our own, straight from end to end."""
+    scene = plan.scene
+    plant = Plant(scene.object, [[0.0, 0.0]], scene.pusher.tip_radius, friction=friction, cof=cof)
+    for slide in plan.slides:
+        pose = plant.follow(pose, slide.pusher[[0, -1]]).object[-1]
+    return pose
+
+
+def test_a_slippery_brick_is_brought_to_its_goal(plan):
+    assert plan.status == "solved"
+    assert not plan.pushes
+    assert [s.kind for s in plan.segments] == ["transit", "slide"] * len(plan.slides) + ["transit"]
+    assert fp.verify(plan).ok
+    end = ends(plan, plan.scene.start_pose)
+    assert np.allclose(pose_error(end, plan.final_pose()), 0, atol=1e-5)
+    assert np.all(np.abs(plan.scene.goal_error(end)) <= plan.scene.planning.goal_tolerance)
+    run = fp.simulate(plan)
+    assert run.outcome == "completed"
+    assert np.allclose(run.final_pose, plan.final_pose(), atol=1e-6)
+    assert {"sliding_left", "sliding_right"} & set(run.modes)
+
+
+def test_the_cost_is_the_way_of_the_finger_and_30_mm_a_change(plan):
+    ways = [np.linalg.norm(s.pusher[-1, :2] - s.pusher[0, :2]) for s in plan.slides]
+    assert plan.cost == pytest.approx(sum(ways) + 0.03 * (len(ways) - 1), rel=1e-9)
+
+
+def test_the_document_holds_it_and_reads_back(plan):
+    document = json.loads(json.dumps(plan_document(plan)))
+    kinds = [s["kind"] for s in document["segments"]]
+    assert kinds.count("slide") == len(plan.slides) >= 2
+    assert fp.verify(parse_plan(document), scene=slippery()).ok
+
+
+def test_sensitivity_is_what_the_plant_does(plan):
+    """By rollouts with other steps: a start 0.2 mm aside in any direction, 0.2° turned, friction of 0.005."""
+    outline, start = plan.scene.object.outline.vertices, plan.scene.start_pose
+    there = transform(ends(plan, start), outline)
+
+    def moved(pose, **changes):
+        return np.max(np.linalg.norm(transform(ends(plan, pose, **changes), outline) - there, axis=1))
+
+    angles = np.arange(0.0, 2 * np.pi, np.pi / 4)
+    away = 2e-4 * np.column_stack([np.cos(angles), np.sin(angles)])
+    turn = np.deg2rad(0.2)
+    cof = plan.scene.object.cof
+    found = {
+        "place": max(moved(start + [*off, 0.0]) for off in away) / 2e-4,  # noqa: RUF005
+        "turn": max(moved(start + np.array([0, 0, s * turn])) for s in (-1, 1)) / turn,
+        "friction": moved(start, friction=0.005) / 0.005,
+        "centre": max(moved(start, cof=cof + off) for off in away) / 2e-4,
+    }
+    for name, value in plan.certificate.sensitivity.items():
+        assert value == pytest.approx(found[name], rel=0.15), name
+    assert plan.certificate.sensitivity["place"] > 1.0
+
+
+def test_slides_never_leaves_it_at_no_plan():
+    refused = fp.plan(slippery(planning=fp.Planning(slides="never")))
+    assert refused.status == "no_plan"
+    assert "no push can steer the object.\n" in refused.reason
+
+
+def test_listed_pushes_are_kept_to():
+    """A scene that lists its pushes is not pushed elsewhere, unless slides are asked for."""
+    thing = fp.Object(BRICK, friction=0.0)
+    pushes = (fp.Push("side", thing.outline.at(0, 0.5)),)
+    assert fp.plan(slippery(pushes=pushes)).status == "no_plan"
+    assert fp.plan(slippery(pushes=pushes, planning=fp.Planning(slides="join"))).slides
+
+
+def test_a_disc_that_nothing_turns_is_told(tmp_path):
+    disc = fp.Object(Outline.circle(0.03), friction=0.0)
+    asked = fp.Scene(disc, (0.05, 0.0, 0.3))
+    (tmp_path / "disc.json").write_text(json.dumps(scene_document(asked)))
+    command = [sys.executable, "-m", "flatpush", "plan", str(tmp_path / "disc.json")]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert ended.returncode == 3
+    assert "no push of this finger turns the object" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert fp.plan(replace(asked, goal=(0.0, 0.0, "free"))).status == "solved"
+
+
+@pytest.mark.slow
+def test_slides_never_make_a_plan_costlier():
+    rng = np.random.default_rng(3)
+    cheaper = 0
+    for _ in range(6):
+        start = rng.uniform(-1, 1, 3) * [0.08, 0.08, np.pi]
+        thing = fp.Object(BRICK, friction=0.2)
+        alone = fp.plan(fp.Scene(thing, start))
+        both = fp.plan(fp.Scene(thing, start, planning=fp.Planning(slides="join")))
+        assert fp.verify(both).ok
+        assert both.cost <= alone.cost
+        cheaper += both.cost < alone.cost
+    assert cheaper
+
+
+def test_one_finger_goes_around_on_the_table_and_keeps_its_clearance():
+    post = [(0.035, 0.055), (0.045, 0.055), (0.045, 0.065), (0.035, 0.065)]
+    found = fp.plan(
+        slippery(
+            pusher=fp.Pusher(transit="planar"),
+            workspace=fp.Workspace((-0.1, -0.1, 0.15, 0.12), (post,)),
+            planning=fp.Planning(clearance=0.001),
+        )
+    )
+    assert found.status == "solved"
+    assert fp.verify(found).ok
+    assert all(not s.height.any() for s in found.segments if s.kind == "transit")
+    assert found.certificate.clearance >= 0.001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("transit", ["lift", "planar"])
+def test_track_looks_after_each_slide_and_arrives(transit):
+    """The finger has a friction that nobody told, the start is off and the camera is noisy."""
+    found = fp.plan(slippery(pusher=fp.Pusher(transit=transit)))
+    tracked = TrackedRun(friction=0.03, start=(0.002, -0.001, 0.05), seed=1)
+    run = tracked.of(found)
+    assert run.outcome == "arrived"
+    assert np.all(np.abs(found.scene.goal_error(run.object[-1])) <= [5e-4, 5e-4, np.deg2rad(0.5)])
+    assert run.modes.count("look") >= len(found.slides)
+    assert len(run.times) == len(run.object) == len(run.heights) == len(run.modes) == len(run.contacts)
+    assert np.all(np.diff(run.times) >= 0)
+    if transit == "lift":  # the hand goes through its places without a jump
+        steps = np.linalg.norm(np.diff(run.pusher[:, :2], axis=0), axis=1)
+        assert np.max(steps) < 0.03
+
+
+def test_figures_show_slides_by_dashes(plan, tmp_path):
+    for name in ("plan.svg", "plan.html"):
+        save = tmp_path / name
+        from flatpush.view import save_figure
+
+        save_figure(plan, save)
+        assert (
+            "slides: path of the centre" if name == "plan.svg" else 'class="flat slide"'
+        ) in save.read_text()
+
+
+def test_a_robot_gets_the_slides(plan, tmp_path):
+    rows = export_csv(plan, tmp_path / "robot.csv")
+    table = np.loadtxt(tmp_path / "robot.csv", delimiter=",", skiprows=1)
+    assert rows == len(table)
+    last = plan.slides[-1].pusher[-1]
+    assert np.min(np.linalg.norm(table[:, 1:3] - last[:2], axis=1)) < 1e-9
+    assert table[-1, 0] == pytest.approx(plan.duration)
