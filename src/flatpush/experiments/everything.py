@@ -89,6 +89,9 @@ SECTIONS = (
     ),
 )
 
+# What takes longest is begun first.
+LONG = ("loops", "replay", "open-loop")
+
 
 @dataclass(frozen=True)
 class Job:
@@ -123,8 +126,10 @@ def everything(
     quick: bool, data: Path | None, spread: Spread, told: Callable[[Done], None]
 ) -> list[tuple[Section, Done]]:
     """All sections, in the order of the report, however they were computed."""
-    jobs = [Job(section.name, quick, "" if data is None else str(data)) for section in SECTIONS]
-    return list(zip(SECTIONS, spread(compute, jobs, told), strict=True))
+    ordered = sorted(SECTIONS, key=lambda section: section.name not in LONG)
+    jobs = [Job(section.name, quick, "" if data is None else str(data)) for section in ordered]
+    done = {one.job.name: one for one in spread(compute, jobs, told)}
+    return [(section, done[section.name]) for section in SECTIONS]
 
 
 def compute(job: Job) -> Done:
@@ -229,7 +234,7 @@ def _fig4(quick: bool, data: Path | None) -> Finding:
 def _cell(quick: bool, data: Path | None, figure: str) -> Finding:
     from . import robot_runs
 
-    found = list(robot_runs.cases(figure, 1 if quick else robot_runs.RUNS))
+    found = list(robot_runs.cases(figure, 2 if quick else robot_runs.RUNS))
     logged = robot_runs.recorded(data, figure) if data is not None else {}
     rows = []
     for start, case, printed in zip(

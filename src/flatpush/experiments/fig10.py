@@ -6,10 +6,13 @@ Once as they planned it (virtual middle contact, no margin, no clearance), and o
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ..geometry import Outline
 from ..planning import plan
 from ..problem import Object, Plan, Planning, Push, Pusher, Scene, Workspace
-from ..simulation import simulate, verify
+from ..simulation import study, verify
+from .cone import STILL
 from .finding import Finding, Row, drawn
 
 TRIANGLE = ((0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095))
@@ -75,8 +78,12 @@ def _words(found: Plan) -> str:
         return f"no plan: {found.reason}"
     pushes = " – ".join(push.push for push in found.pushes)
     held = "verified" if verify(found).ok else "fails verification"
-    ended = simulate(found)
-    return f"{1000 * found.cost:.0f} mm: {pushes}; {held}; simulated: {ended.outcome}"
+    ended = study(found, 1, noise=STILL)
+    off = ended.errors[0]
+    return (
+        f"{1000 * found.cost:.0f} mm: {pushes}; {held}; simulated: {ended.outcomes[0]},"
+        f" {1000 * off[0]:.2f} mm {np.degrees(off[1]):.2f}° off"
+    )
 
 
 def _draw(found: Plan, folder: Path) -> None:

@@ -13,7 +13,7 @@ from ..simulation.rollout import roll
 from .feedback import WITHIN, Task, attempt, task
 from .finding import Finding, Row
 
-TASKS, QUICK = 40, 4
+TASKS, QUICK = 40, 2
 LAWS = {"path law": "path", "feedback linearisation": "dfl", "receding horizon": "horizon"}
 
 

@@ -4,10 +4,9 @@ Models, contacts and switching costs are as stored; the cost is the path of the 
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -45,8 +44,9 @@ class StoredQuery:
     pushes: tuple[int, ...]
 
 
-def stored_fleet(document: Mapping[str, Any]) -> Fleet:
-    """The middle contacts, their normals, a and b as stored; no margin."""
+def stored_fleet(graph: Path) -> Fleet:
+    """The cars of a stored graph's file: middle contacts, normals, a and b as stored; no margin."""
+    document = json.loads(graph.read_text(encoding="utf-8"))
     cars = []
     for push in document["push_actions"]:
         surface = Ellipsoid(np.diag([push["a"], push["a"], push["b"]]))
@@ -68,7 +68,7 @@ def queries(data: Path) -> Iterator[StoredQuery]:
         raise InputError(f"stored graphs are missing: {', '.join(missing)}", source=str(folder))
     reference = json.loads((folder / "requery_reference.json").read_text(encoding="utf-8"))
     for name in GRAPHS:
-        fleet = stored_fleet(json.loads((folder / f"{name}.json").read_text(encoding="utf-8")))
+        fleet = stored_fleet(folder / f"{name}.json")
         found = reference[name]
         if "butter" in name:  # the order of the figure, not of the file
             found = sorted(found, key=lambda q: q["query_offset_mm_mm_rad"][0])
