@@ -45,17 +45,22 @@ def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     assert "arrived" in text
     assert "sticking" in text
     assert figure.read_bytes().lstrip().startswith(b"<")
-    again = ("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json")
-    assert call(*again, "--tolerance", "1,1") == 0
+    noisy = ("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json")
+    assert call(*noisy, "--tolerance", "1,1") == 0
     first = json.loads(capsys.readouterr().out)
     assert first["outcome"] == "arrived"
     assert first["distance"] < 0.001
     assert first["turn"] < np.deg2rad(1)
+
+
+def test_a_seed_gives_the_same_run_and_ending_beside_the_goal_has_a_status(plan, capsys):
+    again = ("track", plan[1], "--controller", "path", "--friction", 0.35, "--seed", 3, "--json")
     assert call(*again, "--tolerance", "1,1") == 0
-    assert json.loads(capsys.readouterr().out) == first
+    first = json.loads(capsys.readouterr().out)
     assert call(*again, "--tolerance", "0.001,0.001") == 3
     beside = json.loads(capsys.readouterr().out)
     assert beside["outcome"].startswith(f"ended beside the goal: {1000 * beside['distance']:.2f} mm")
+    assert {**beside, "outcome": "arrived"} == first
 
 
 def test_what_makes_no_sense_is_refused(plan):

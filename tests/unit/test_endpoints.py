@@ -5,7 +5,8 @@ import pytest
 
 import flatpush as fp
 
-SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
+SQUARE = fp.Object([(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)])
+DISC = fp.Object(fp.Outline.circle(0.01))
 BLOCK = [(0.05, -0.02), (0.09, -0.02), (0.09, 0.02), (0.05, 0.02)]
 BOUNDS = (-0.2, -0.2, 0.2, 0.2)
 
@@ -16,11 +17,11 @@ def answer(
     clearance=0.0,
     obstacles=(BLOCK,),
     bounds=BOUNDS,
-    outline=SQUARE,
+    thing=SQUARE,
     **planning,
 ):
     scene = fp.Scene(
-        fp.Object(outline),
+        thing,
         start,
         goal,
         fp.Pusher(fingers=2, spacing=0.01),
@@ -46,7 +47,7 @@ def answer(
             {"obstacles": [fp.Outline.circle(0.02, (0.0, 0.128))]},
             ["at the goal", "overlaps obstacle 0 by 2.00 mm"],
         ),
-        ({"outline": fp.Outline.circle(0.01), "start": (0.195, 0, 0)}, ["right side", "5.00 mm"]),
+        ({"thing": DISC, "start": (0.195, 0, 0)}, ["right side", "5.00 mm"]),
     ],
 )
 def test_an_object_that_cannot_be_there_is_refused(case, words):

@@ -15,8 +15,9 @@ from ...steering.flat import FlatOutput
 from ..learning.belief import SteeringEstimate
 from .formulas import flat_motion
 
-# Turns per length at which the drift is computed, and halvings of the force's angle for each.
-_SAMPLES, _HALVINGS = 21, 40
+# Turns per length at which the drift is computed; for each, steps of the force's angle, and what is exact enough, as a
+# part of the whole range of turns.
+_SAMPLES, _STEPS, _EXACT = 21, 40, 1e-12
 # The same for two fingers, where they cost nothing.
 _FINE = 801
 # The edges of a friction cone themselves belong to sliding.
@@ -214,12 +215,22 @@ class SteeringModel:
 
 
 def _twist(car: Car, point: Array, h: Array, kappa: float) -> Array:
-    """The sticking twist in O whose turn, per length of a point along h, is kappa; by halving the force's angle."""
-    left, _, right = car.contact.force_angles(car.forces)
-    V = np.zeros(3)
-    for _ in range(_HALVINGS):
-        angle = 0.5 * (left + right)
-        V = shift_twist(car.surface.twist(car.contact.wrench(rotate(angle, car.contact.normal))), -car.cof)
-        turn = float(V[2]) / float(velocity_at(V, point) @ h)
-        left, right = (angle, right) if turn < kappa else (left, angle)
+    """The sticking twist in O whose turn, per length of a point along h, is kappa: by the Illinois rule."""
+
+    def at(angle: float) -> tuple[Array, float]:
+        wrench = car.contact.wrench(rotate(angle, car.contact.normal))
+        V = shift_twist(car.surface.twist(wrench), -car.cof)
+        return V, float(V[2]) / float(velocity_at(V, point) @ h) - kappa
+
+    before, _, here = car.contact.force_angles(car.forces)
+    (_, over), (V, off) = at(before), at(here)
+    least = _EXACT * (abs(over) + abs(off))
+    for _ in range(_STEPS):
+        angle = here - off * (here - before) / (off - over)
+        V, value = at(angle)
+        if abs(value) <= least:
+            break
+        # The end that stays counts half, so that both ends move.
+        before, over = (before, 0.5 * over) if (value < 0) == (off < 0) else (here, off)
+        here, off = angle, value
     return V
