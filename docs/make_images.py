@@ -31,16 +31,33 @@ PICTURES: dict[str, list[str]] = {
     ],
 }
 
-# Of the live page: what is done on it before the picture is taken, the size of the window, and whether it is dark.
+# Of the live page: its scene, what is done on it before the picture, the size of the window, and whether it is dark.
 BLOCK = "for (let k = 0; k < 2; k++) document.getElementById('add').click(); flatpush.model.select('');"
+SHOVED = """
+document.getElementById('controller').value = 'horizon'; document.getElementById('speed').value = '8';
+document.getElementById('follow').click();
+const wait = setInterval(() => {
+  const { live } = flatpush.feedback;
+  if (live.height.length < 90 || live.height.slice(-90).some((height) => height > 0)) return;
+  const [x, y, angle] = flatpush.feedback.pose;
+  flatpush.feedback.shove([x + 10, y - 40, angle]);
+  clearInterval(wait);
+}, 50);
+"""
 READY = (
     "return window.flatpush && flatpush.answered && !flatpush.busy"
-    " && (!flatpush.mechanics.name || Boolean(flatpush.mechanics.shown));"
+    " && !flatpush.feedback.on && (!flatpush.mechanics.name || Boolean(flatpush.mechanics.shown));"
 )
-PAGES: dict[str, tuple[str, tuple[int, int], bool]] = {
-    "page.png": ("", (1280, 720), False),
-    "page_dark.png": (BLOCK, (1000, 700), True),
-    "page_mechanics.png": ("document.querySelector('[data-push=\"0\"]').click();", (1280, 720), False),
+PAGES: dict[str, tuple[str, str, tuple[int, int], bool]] = {
+    "page.png": ("triangle", "", (1280, 720), False),
+    "page_dark.png": ("triangle", BLOCK, (1000, 700), True),
+    "page_mechanics.png": (
+        "triangle",
+        "document.querySelector('[data-push=\"0\"]').click();",
+        (1280, 720),
+        False,
+    ),
+    "page_feedback.png": ("triangle_one_finger", SHOVED, (1280, 720), False),
 }
 
 
@@ -52,10 +69,10 @@ def photograph(name: str) -> None:
 
     from selenium import webdriver
 
-    script, (width, height), dark = PAGES[name]
+    scene, script, (width, height), dark = PAGES[name]
     served = subprocess.Popen(
         [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser", "--port", "0",
-         str(EXAMPLES / "triangle.yaml")],
+         str(EXAMPLES / f"{scene}.yaml")],
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert served.stderr is not None
@@ -71,7 +88,10 @@ def photograph(name: str) -> None:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
         browser.get(link)
-        for step in ("", script, "flatpush.player.show(0.3 * flatpush.player.duration);"):
+        shown = "flatpush.player.show(0.3 * flatpush.player.duration);"
+        if scene != "triangle":
+            shown = "flatpush.table.fit(); flatpush.player.show(0.75 * flatpush.player.duration);"
+        for step in ("", script, shown):
             browser.execute_script(step)
             while not browser.execute_script(READY):
                 time.sleep(0.1)

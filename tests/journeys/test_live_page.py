@@ -1,62 +1,18 @@
-"""flatpush view as a user meets it: the server from outside, and the page in headless Chromium."""
+"""flatpush view as a user meets it: the page in headless Chromium."""
 
 import itertools
 import json
-import re
-import signal
-import socket
-import subprocess
-import sys
 import time
-import urllib.error
-import urllib.request
-from contextlib import ExitStack
-from pathlib import Path
 
+import numpy as np
 import pytest
+from tests.live_server import EXAMPLES, PATIENCE, Served
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
 pytest.importorskip("starlette", reason="the server is in the extra `page`")
-pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-COMMAND = [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser"]
 DESK, TABLET = (1280, 720), (820, 1180)
-PATIENCE = 60  # for an answer on a busy machine [s]
-
-
-class Served:
-    """A server in a process of its own, and what it has said."""
-
-    def __init__(self, *arguments):
-        self.process = subprocess.Popen(
-            [*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        self.said = ""
-        while "token=" not in self.said:
-            line = self.process.stderr.readline()
-            assert line, self.said
-            self.said += line
-        self.link = re.search(r"http://\S+", self.said)[0]
-        self.host = self.link.split("/")[2]
-        self.token = self.link.split("token=")[1]
-
-    def get(self, path, **headers):
-        """Status and headers of an answer."""
-        request = urllib.request.Request(f"http://{self.host}{path}", headers=headers)
-        try:
-            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
-                return answer.status, answer.headers, answer.read()
-        except urllib.error.HTTPError as error:
-            return error.code, error.headers, error.read()
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        self.process.wait(PATIENCE)
-        self.process.stderr.close()
-        self.process.stdout.close()
 
 
 @pytest.fixture(scope="module")
@@ -64,143 +20,6 @@ def server():
     found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
     yield found
     found.stop()
-
-
-@pytest.fixture
-def talk(server):
-    """Opens a WebSocket to the server as a page would, with other headers or another token if asked."""
-    from websockets.sync.client import connect
-
-    with ExitStack() as opened:
-
-        def start(token=None, host=server.host, **more):
-            more.setdefault("origin", f"http://{host}")
-            address = f"ws://{host}/live?token={server.token if token is None else token}"
-            home, port = server.host.split(":")
-            there = opened.enter_context(socket.create_connection((home, int(port))))
-            line = connect(
-                address, sock=there, open_timeout=PATIENCE, max_size=None, compression=None, **more
-            )
-            return opened.enter_context(line)
-
-        yield start
-
-
-def ask(line, number, kind, value):
-    line.send(json.dumps({"number": number, "kind": kind, "value": value}))
-
-
-def hear(line, kind):
-    """The next message of a kind."""
-    while True:
-        message = json.loads(line.recv(PATIENCE))
-        if message["kind"] == kind:
-            return message
-
-
-def test_only_who_has_the_link_gets_the_page(server):
-    status, headers, body = server.get(f"/?token={server.token}")
-    assert status == 200
-    assert b"<title>flatpush</title>" in body
-    assert "default-src 'self'" in headers["Content-Security-Policy"]
-    for path in ("/", "/?token=wrong"):
-        assert server.get(path)[0] == 403
-    for path in ("/server.py", "/..%2fserver.py", "/%2e%2e/server.py", "/nothing.js"):
-        assert server.get(path)[0] == 404
-    assert server.get(f"/?token={server.token}", Host="evil.example")[0] == 403
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"token": "wrong"},
-        {"token": ""},
-        {"origin": "http://evil.example"},
-        {"origin": None},
-        {"host": "evil.example"},  # a name of theirs that leads to this machine
-    ],
-)
-def test_a_foreign_page_gets_no_connection(talk, wrong):
-    from websockets.exceptions import InvalidStatus
-
-    with pytest.raises(InvalidStatus, match="403"):
-        talk(**wrong)
-
-
-def test_a_message_is_answered_or_refused_and_the_next_one_still_counts(server, talk):
-    line = talk()
-    scene = hear(line, "hello")["scene"]
-    line.send("{")
-    assert "a message is JSON" in hear(line, "error")["reason"]
-    ask(line, 1, "plan", {"flatpush": "scene/1"})
-    answer = hear(line, "plan")
-    assert (answer["status"], answer["number"]) == ("refused", 1)
-    assert "object" in answer["reason"]
-    scene["object"]["outline"] = {"file": "/etc/hostname"}
-    ask(line, 2, "plan", scene)
-    assert "names no files" in hear(line, "plan")["reason"]
-    other = talk()  # a second tab
-    whole = hear(other, "hello")["scene"]
-    ask(other, 1, "plan", whole)
-    assert hear(other, "plan")["status"] == "solved"
-    assert hear(other, "done")["number"] == 1
-
-
-def flood(line, messages):
-    """Sends all, and listens until the other side has had enough."""
-    for message in messages:
-        line.send(message)
-    while True:
-        line.recv(PATIENCE)
-
-
-def test_too_much_and_too_often_ends_the_connection_alone(server, talk):
-    from websockets.exceptions import ConnectionClosed
-
-    line = talk()
-    hear(line, "hello")
-    with pytest.raises(ConnectionClosed) as ended:
-        flood(line, ["x" * 4_000_000])
-    assert ended.value.rcvd.code == 1009
-    line = talk()
-    with pytest.raises(ConnectionClosed) as ended:
-        flood(line, ["{}"] * 2000)
-    assert ended.value.rcvd.code == 1008
-    assert hear(talk(), "hello")["scene"]["object"]["name"] == "triangle"
-
-
-def test_a_port_that_is_taken_is_not_in_the_way_and_ctrl_c_ends_everything():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        served = Served("--port", str(port))
-        assert f"port {port} is in use; this is port" in served.said
-        children = subprocess.run(
-            ["ps", "-o", "pid=", "--ppid", str(served.process.pid)], capture_output=True, text=True
-        ).stdout.split()
-        served.process.send_signal(signal.SIGINT)
-        assert served.process.wait(PATIENCE) == 130
-    assert "Traceback" not in served.process.stderr.read()
-    served.stop()
-    for _ in range(50):
-        left = [pid for pid in children if Path(f"/proc/{pid}").exists()]
-        if not left:
-            break
-        time.sleep(0.1)
-    assert not left
-
-
-def test_an_address_of_another_machine_is_refused_in_words():
-    ended = subprocess.run(
-        [*COMMAND, "--host", "203.0.113.9"], capture_output=True, text=True, timeout=PATIENCE
-    )
-    assert ended.returncode == 2
-    assert "nothing can be served at 203.0.113.9" in ended.stderr
-    assert "Traceback" not in ended.stderr
-
-
-# ---- in a browser ----
 
 
 @pytest.fixture
@@ -235,10 +54,17 @@ class Page:
     def js(self, code, *arguments):
         return self.browser.execute_script(code, *arguments)
 
-    def wait(self, condition):
+    def wait(self, condition, patience=PATIENCE):
         from selenium.webdriver.support.ui import WebDriverWait
 
-        WebDriverWait(self.browser, PATIENCE, 0.05).until(lambda _: self.js(f"return Boolean({condition})"))
+        WebDriverWait(self.browser, patience, 0.05).until(lambda _: self.js(f"return Boolean({condition})"))
+
+    def wait_for(self, file):
+        for _ in range(10 * PATIENCE):
+            if file.exists():
+                return
+            time.sleep(0.1)
+        raise AssertionError(f"{file.name} was not saved")
 
     def settle(self):
         self.wait("!flatpush.busy")
@@ -431,11 +257,7 @@ def test_what_is_saved_can_be_planned_and_verified(page):
             what,
         )
         file = page.browser.downloads / name
-        for _ in range(10 * PATIENCE):
-            if file.exists():
-                break
-            time.sleep(0.1)
-        assert file.exists(), what
+        page.wait_for(file)
     assert fp.load_scene(page.browser.downloads / "triangle.yaml").object.name == "triangle"
     assert fp.verify(fp.load_plan(page.browser.downloads / "triangle.json")).ok
     assert (page.browser.downloads / "triangle.svg").read_text(encoding="utf-8").startswith("<svg")
@@ -484,7 +306,7 @@ def test_the_pointer_is_a_finger_that_pushes(page):
         time.sleep(0.05)
     page.wait("Math.abs(flatpush.hand.object[0] - flatpush.model.scene.start[0]) > 3")
     assert page.js(
-        "return flatpush.hand.rows.some((row) => row[6] === 'sticks' || row[6].startsWith('slides'))"
+        "return flatpush.hand.rows.some((row) => row[3] === 'sticks' || row[3].startsWith('slides'))"
     )
     page.mouse("mouseReleased", x + 120, y)
     assert page.scene["start"] == before
@@ -493,11 +315,11 @@ def test_the_pointer_is_a_finger_that_pushes(page):
         "const s = document.getElementById('save'); s.value = 'run'; s.dispatchEvent(new Event('change'));"
     )
     file = page.browser.downloads / "pushed-by-hand.csv"
-    for _ in range(10 * PATIENCE):
-        if file.exists():
-            break
-        time.sleep(0.1)
-    assert file.read_text(encoding="utf-8").startswith("t_s,object_x_mm")
+    page.wait_for(file)
+    from flatpush.documents.robot_log import load_robot_log
+
+    (run,) = load_robot_log(file).runs
+    assert 1e3 * run.poses[-1, :2] == pytest.approx(pushed[:2], abs=1.0)
     page.click("here")
     page.settle()
     assert page.scene["start"][:2] == pytest.approx(pushed[:2], abs=0.01)
@@ -560,6 +382,156 @@ def test_a_lost_connection_is_said_and_taken_up_again(page):
     assert page.plan["motion"]["object"][0][2] == pytest.approx(page.js("return -Math.PI / 4"), abs=1e-4)
 
 
-def test_the_page_weighs_little():
-    static = Path(__file__).parents[2] / "src" / "flatpush" / "page" / "static"
-    assert sum(file.stat().st_size for file in static.iterdir()) < 250_000
+def test_the_wrench_of_the_arc_that_is_played_sits_on_the_limit_surface(page):
+    page.browser.find_element("css selector", '#pushes [data-push="0"]').click()
+    page.wait("flatpush.mechanics.shown")
+    shares = []
+    for arc, told in enumerate(page.js("return flatpush.mechanics.shown.arcs")):
+        page.js(
+            "const s = flatpush.player.motion.segments.find((part) => part.number === 1);"
+            "flatpush.player.show(s.turns[arguments[0]].end - 0.01)",
+            arc,
+        )
+        x, y, z = told["wrench"]
+        seen = page.js(
+            "const c = document.querySelector('#surfacemesh circle.wrench');"
+            "return [Number(c.getAttribute('cx')), Number(c.getAttribute('cy'))];"
+        )
+        around, up = np.radians([page.js("return Number(document.getElementById('around').value)"), 22])
+        right = -x * np.sin(around) + y * np.cos(around)
+        above = z * np.cos(up) - np.sin(up) * (x * np.cos(around) + y * np.sin(around))
+        assert seen == pytest.approx([right, -above], abs=1e-6)
+        shares.append(page.text("wrench"))
+        assert page.js("return document.querySelector('#mechanics .drive').getAttribute('d').length") > 10
+    assert len(set(shares)) == len(
+        {tuple(a["wrench"]) for a in page.js("return flatpush.mechanics.shown.arcs")}
+    )
+    page.js("flatpush.player.show(0)")  # before it lands
+    assert page.text("wrench").startswith("no wrench")
+    page.js("flatpush.model.select('')")
+    assert not page.browser.find_element("id", "surface").is_displayed()
+
+
+def test_two_hundred_runs_are_told_as_they_finish_and_the_page_does_not_wait(page):
+    page.press("m")
+    page.wait("flatpush.many.told")
+    page.js("document.getElementById('start').focus()")
+    page.press("r")  # while they run the plan still follows
+    page.wait("flatpush.many.told === null")
+    page.settle()
+    assert page.plan["motion"]["object"][0][2] == pytest.approx(-np.pi / 4, abs=1e-4)
+    page.press("m")
+    counts = set()
+    while page.js("return !flatpush.many.told || flatpush.many.told.done < 200"):
+        counts.add(page.js("return flatpush.many.told ? flatpush.many.told.done : 0"))
+    assert page.text("runsdone").startswith("200 of 200 runs: ")
+    assert counts - {0, 200}
+    assert page.js("return document.querySelectorAll('#tube .band').length") >= 2
+    errors = page.js("return flatpush.many.told.errors")
+    assert f"worst {errors[2]['distance']:.2f} mm" in page.text("runserrors").replace("<0.01", "0.00")
+    page.click("runsclear")
+    assert page.js("return document.getElementById('tube').children.length") == 0
+
+
+# ---- a stored plan and a recorded run ----
+
+BLOCK = """
+flatpush: scene/1
+units: {length: mm, angle: deg}
+object: {name: block, outline: [[-25, -20], [25, -20], [25, 20], [-25, 20]], friction: 0.4}
+pusher: {fingers: 1, tip_radius: 3}
+start: [-30, 3, 0]
+goal: [0, 0, 0]
+planning: {iterations: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A plan, and a server that shows a run of it."""
+    import flatpush as fp
+    from flatpush.documents import mapping_of, parse_scene
+
+    folder = tmp_path_factory.mktemp("stored")
+    plan = fp.plan(parse_scene(mapping_of(BLOCK)))
+    plan.save(folder / "block.json")
+    rows = [
+        "object,start_id,run_id,t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id"
+    ]
+    rows += [f"block,,,{k / 10},{-30 + k},3,0,{-58 + k},3,0,1" for k in range(31)]
+    (folder / "run.csv").write_text("\n".join([*rows, "# ended: done", ""]), encoding="utf-8")
+    found = Served(str(folder / "run.csv"), "--scene", str(folder / "block.json"), "--port", "0")
+    yield plan, found
+    found.stop()
+
+
+@pytest.fixture
+def recording(browser, stored):
+    found = Page(browser, stored[1])
+    yield found
+    assert browser.get_log("browser") == []
+
+
+def test_a_stored_plan_and_a_recorded_run_are_shown_until_something_is_changed(recording, stored):
+    page, (plan, _) = recording, stored
+    assert page.text("subtitle").endswith("stored and verified")
+    assert page.text("spent") == "stored"
+    assert page.text("cost") == f"{1e3 * plan.cost:.1f} mm"
+    assert page.text("recordingended") == "It ended: done."
+    page.js("flatpush.player.show(1.5)")
+    assert page.js("return flatpush.player.state(1.5).object") == pytest.approx([-15, 3, 0])
+    x, y = page.js(
+        "const b = document.getElementById('run').getBBox(); return [b.x + b.width, b.y + b.height / 2];"
+    )
+    assert (x, y) == pytest.approx((0, 3), abs=1e-3)  # the way of its middle
+    page.press("\ue00c")  # Escape: the plan again
+    assert page.js("return flatpush.player.duration") == pytest.approx(plan.duration, abs=1e-3)
+    page.js("document.getElementById('start').focus()")
+    page.press("r")
+    page.settle()
+    assert "stored" not in page.text("subtitle")
+    page.click("undo")
+    page.settle()
+    assert page.text("subtitle").endswith("stored and verified")
+
+
+def test_the_object_is_shoved_in_mid_push_and_the_horizon_controller_lands_again(recording):
+    page = recording
+    page.js(
+        "document.getElementById('controller').value = 'horizon'; document.getElementById('speed').value = 8;"
+    )
+    page.press("c")
+    page.wait("flatpush.feedback.live.segments.some((part) => part.text === 'push, sticks')")
+    page.js("flatpush.feedback.pause()")
+    page.wait("!flatpush.feedback.waiting")
+    landings = page.js("return flatpush.feedback.moves")
+    before, unit = page.js("return flatpush.feedback.pose"), page.js("return flatpush.table.view.unit")
+    x, y = page.middle("#object .body")
+    page.mouse("mousePressed", x, y)
+    page.mouse("mouseMoved", x - 8 / unit, y - 40 / unit)
+    page.js("flatpush.feedback.pause()")
+    page.wait(f"flatpush.feedback.pose[1] > {before[1] + 39}")
+    page.mouse("mouseReleased", x - 8 / unit, y - 40 / unit)
+    page.wait("!flatpush.feedback.on", 4 * PATIENCE)
+    assert page.text("followed").startswith("Arrived after ")
+    assert page.js("return flatpush.feedback.moves") > landings
+    x, y, _ = page.js("return flatpush.feedback.pose")
+    assert np.hypot(x, y) < 2.5
+    assert page.js("return flatpush.player.now") == page.js(
+        "return flatpush.player.duration"
+    )  # nothing jumps
+    page.js(
+        "const s = document.getElementById('save'); s.value = 'run'; s.dispatchEvent(new Event('change'));"
+    )
+    file = page.browser.downloads / "run.csv"
+    page.wait_for(file)
+    from flatpush.documents.robot_log import load_robot_log
+
+    (run,) = load_robot_log(file).runs
+    assert run.object == "block"
+    assert 1e3 * run.poses[-1, :2] == pytest.approx([x, y], abs=1.0)
+    page.browser.find_element("id", "follow").click()
+    page.wait("flatpush.feedback.live.times.length > 2")
+    page.press("a")  # another scene: the run ends in words
+    assert page.text("followed") == "The scene was changed, and the run ended."
+    page.settle()

@@ -1,7 +1,9 @@
 """The live page without its server: scenes in millimetres, files, messages, and plans that follow."""
 
 import base64
+import itertools
 import json
+from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
 from threading import Thread
@@ -10,16 +12,27 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush.control import Camera
+from flatpush.control.tracking.simulated_run import TrackedRun
 from flatpush.documents import mapping_of, parse_plan, parse_scene, scene_document, scene_template
 from flatpush.errors import InputError
+from flatpush.execution.log import open_log
+from flatpush.execution.robot import State, Target
+from flatpush.execution.run import Cycle
+from flatpush.geometry import shift_twist
 from flatpush.page import worker
 from flatpush.page.by_hand import ByHand
+from flatpush.page.feedback import Followed
 from flatpush.page.files import read_dropped, saved
 from flatpush.page.in_mm import refuse_files, scene_in_mm
 from flatpush.page.live import LivePlanner
+from flatpush.page.many_runs import many_runs
 from flatpush.page.mechanics import mechanics
 from flatpush.page.picture import picture
+from flatpush.page.recorded import recorded
 from flatpush.page.server import checked_message
+from flatpush.problem.mechanics import surface_of
+from flatpush.simulation import Noise, study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENE = """
@@ -118,7 +131,8 @@ def test_a_message_is_taken_apart():
 
 
 def dropped(name, content, **more):
-    return read_dropped({"name": name, "data": base64.b64encode(content).decode(), **more})
+    answer, _ = read_dropped({"name": name, "data": base64.b64encode(content).decode(), **more})
+    return answer
 
 
 def test_a_drawing_is_dropped_as_an_outline_about_its_centroid():
@@ -240,6 +254,216 @@ def test_of_the_requests_of_a_client_the_newest_wins(document):
     plans = [answer for client, _, answer in answers if client == 1 and answer["kind"] == "plan"]
     assert plans[0]["status"] == "solved"
     assert [answer["reason"] for client, _, answer in answers if client == 3] == ["there is no plan to save"]
+
+
+def answers_of(requests, last):
+    """What the worker answers to requests of client 1, until one of a kind has come so often."""
+    here, there = Pipe()
+    for request in requests:
+        here.send(request)
+
+    def run():
+        with pytest.raises((EOFError, OSError)):
+            worker._Worker(there).run()
+
+    thread = Thread(target=run)
+    thread.start()
+    found = []
+    while not found or found[-1]["kind"] != last:
+        assert here.poll(60), "the worker is gone"
+        client, number, answer = here.recv()
+        if client == 1:
+            found.append({**answer, "number": number})
+    here.close()
+    thread.join(10)
+    assert not thread.is_alive()
+    return found
+
+
+@pytest.fixture(scope="module")
+def short():
+    """A plan of one push with one finger, and the document of its scene."""
+    thing = "{name: block, outline: [[-25, -20], [25, -20], [25, 20], [-25, 20]], friction: 0.4}"
+    scene = parse_scene(
+        mapping_of(
+            f"flatpush: scene/1\nunits: {{length: mm, angle: deg}}\nobject: {thing}\n"
+            "pusher: {fingers: 1, tip_radius: 3}\npushes: [{name: short side, at: [-25, 0]},"
+            " {name: above, at: [0, 20]}, {name: right, at: [25, 0]}, {name: below, at: [0, -20]}]\n"
+            "start: [-30, 3, 0]\ngoal: [0, 0, 0]\n"
+        )
+    )
+    plan = fp.plan(scene)
+    return plan, json.loads(json.dumps(scene_in_mm(plan.scene)))
+
+
+def test_a_stored_plan_is_shown_itself_until_the_scene_is_another(short):
+    """A plan that no planner would make: its cost is told to be 1 mm more, which verify finds out."""
+    plan, document = short
+    dearer = replace(plan, cost=plan.cost + 0.001)
+    found = answers_of(
+        [(0, 1, "keep", {"document": document, "plan": dearer}), (1, 1, "plan", document)], "done"
+    )
+    assert [answer["kind"] for answer in found] == ["plan", "plan", "done"]
+    assert [answer.get("stored") for answer in found[:2]] == ["stored", "stored, fails verification"]
+    assert found[0]["cost"].startswith(f"{1e3 * dearer.cost:.1f} mm")
+    assert "it does not hold: cost" in found[1]["warnings"]
+    known = LivePlanner()
+    known.keep(document, dearer)
+    assert known.kept(json.loads(json.dumps(document))) is dearer
+    assert known.kept({**document, "start": [0, 1, 0]}) is None
+
+
+def test_a_dropped_plan_is_the_plan_that_is_shown(short):
+    plan, document = short
+    data = base64.b64encode(saved({"what": "plan"}, plan)["text"].encode()).decode()
+    file = (1, 1, "file", {"name": "block.json", "data": data})
+    found = answers_of([file, (1, 2, "plan", document)], "done")
+    assert found[0]["scene"] == document
+    assert found[-2]["stored"] == "stored and verified"
+
+
+CAMERA = {"controller": "path", "delay": 0.1, "frames": 30, "noise": [0.3, 0.3], "learn": False, "seed": 3}
+
+
+def test_a_run_under_feedback_is_that_of_track_however_it_is_cut_up(short):
+    plan, _ = short
+    whole = TrackedRun(camera=Camera(30, 0.1, 0.0003, np.radians(0.3)), seed=3).of(plan)
+    followed, rows, answer = Followed(plan, CAMERA), [], {"outcome": ""}
+    for seconds in itertools.cycle((0.017, 0.3, 2.0)):
+        answer = json.loads(json.dumps(followed.on({"seconds": seconds}), allow_nan=False))
+        rows += answer["rows"][bool(rows) :]
+        if answer["outcome"]:
+            break
+    assert answer["outcome"] == whole.outcome
+    told = np.array(rows)
+    np.testing.assert_allclose(told[:, 0], whole.times, atol=1e-4)
+    np.testing.assert_allclose(told[:, 1:4], whole.object * [1e3, 1e3, 1], atol=1e-3)
+    np.testing.assert_allclose(told[:, 4:7], whole.pusher * [1e3, 1e3, 1], atol=1e-3)
+    np.testing.assert_allclose(told[:, 7], 1e3 * whole.heights, atol=0.01)
+    assert (answer["mode"], answer["landings"]) == ("done", 0)
+
+
+def test_an_object_that_is_moved_by_hand_is_where_it_was_put_and_the_horizon_lands_again(short):
+    plan, _ = short
+    followed = Followed(plan, {**CAMERA, "controller": "horizon"})
+    answer = followed.on({"seconds": 0.1})
+    while answer["contact"] != "sticks":
+        answer = followed.on({"seconds": 0.1})
+    x, y, turn = answer["rows"][-1][1:4]
+    answer = followed.on({"seconds": 0.017, "moved": [x - 8, y + 40, turn]})
+    assert answer["contact"] == "off the object"
+    np.testing.assert_allclose(answer["rows"][-1][1:4], [x - 8, y + 40, turn], atol=1e-3)
+    landings = answer["landings"]
+    while not answer["outcome"]:
+        answer = followed.on({"seconds": 1})
+    assert answer["outcome"] == "arrived"
+    assert answer["landings"] > landings
+    assert np.hypot(*answer["rows"][-1][1:3]) < 2
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"controller": "luck"},
+        {"delay": -1},
+        {"delay": 3},
+        {"frames": 0},
+        {"noise": [1]},
+        {"learn": 1},
+        {"seed": -1},
+        {"seed": True},
+    ],
+)
+def test_a_run_that_is_none_is_refused(short, wrong):
+    with pytest.raises(InputError):
+        Followed(short[0], {**CAMERA, **wrong})
+
+
+def test_many_runs_are_told_as_they_finish_and_are_those_of_simulate(short):
+    plan, document = short
+    asked = {"count": 25, "seed": 4, "position": 0.5, "angle": 0.5, "friction": 10}
+    requests = [(0, 1, "keep", {"document": document, "plan": plan}), (1, 1, "plan", document)]
+    found = answers_of([*requests, (1, 2, "runs", asked), (1, 3, "on", {})], "refused")
+    assert found[-1]["reason"] == "nothing is followed"
+    assert all(answer.get("done") != 25 for answer in found)  # what was asked for later was not kept waiting
+    told = list(many_runs(plan, asked))
+    assert [part["done"] for part in told] == [10, 25]
+    whole = study(plan, 25, 4, noise=Noise(0.0005, np.radians(0.5), 0.1), record=True)
+    np.testing.assert_allclose(told[-1]["ends"], whole.final * [1e3, 1e3, 1], atol=1e-3)
+    errors = np.sort(np.hypot(*np.array(told[-1]["ends"])[:, :2].T))  # the goal is the origin
+    half, _, worst = told[-1]["errors"]
+    assert half["distance"] == pytest.approx(errors[12], abs=1e-3)
+    assert worst["distance"] == pytest.approx(errors[-1], abs=1e-3)
+    assert told[-1]["sticking"] == pytest.approx(np.mean(told[-1]["stuck"]))
+    widest = max((np.ptp(np.array(band["ring"])[:, 1]) for band in told[-1]["bands"]), default=0)
+    assert 1 < widest < 40
+
+
+@pytest.mark.parametrize("ending", [".csv", ".mcap"])
+def test_a_log_of_a_run_is_played_as_it_was(short, tmp_path, ending):
+    if ending == ".mcap":
+        pytest.importorskip("mcap", reason="bags are in the extra `export`")
+    plan, document = short
+    path = tmp_path / f"run{ending}"
+    poses = np.linspace([-0.04, 0.005, 3.1], [0, 0, 3.3], 11)  # the angle goes on beyond π
+    hands = np.linspace([-0.068, 0.005, 0.03, 0], [-0.028, 0, 0, 0], 11)
+    hands[3:, 2] = 0
+    with open_log(path, "block") as log:
+        for k, (pose, hand) in enumerate(zip(poses, hands, strict=True)):
+            pose[2] = np.arctan2(np.sin(pose[2]), np.cos(pose[2]))
+            seen = None if k == 5 else pose
+            leg = "segment 1 (push short side)" if k > 2 else "segment 0 (transit)"
+            target, state = Target(k / 10, hand, np.zeros(4)), State(hand, np.zeros(4), k / 10)
+            log.write(Cycle(k / 10, target, state, seen, leg, 1, "plan", 0.0, 0.0))
+        log.end("done")
+    (run,) = recorded(path, plan.scene, plan)
+    motion = json.loads(json.dumps(run["motion"], allow_nan=False))
+    assert run["outcome"] == "done"
+    first = 0 if ending == ".mcap" else 3  # a CSV holds what was done on the table
+    assert len(motion["times"]) == 11 - first
+    assert motion["times"][-1] == pytest.approx(1 - first / 10)
+    x, y, turn = np.array(motion["object"]).T
+    np.testing.assert_allclose([x[-1], y[-1], np.cos(turn[-1])], [0, 0, np.cos(3.3)], atol=1e-3)
+    assert np.max(np.diff(turn)) < 0.05
+    np.testing.assert_allclose(
+        motion["object"][5 - first], motion["object"][4 - first], atol=1e-9
+    )  # not seen
+    np.testing.assert_allclose(motion["pusher"][-1], [-28, 0, 0], atol=1e-3)
+    last = motion["segments"][motion["segment"][-1]]
+    assert (last["push"], last["number"]) == ("short side", 1)
+    np.testing.assert_allclose(last["tips"], 1e3 * plan.pushes[0].fingers, atol=1e-3)
+    if ending == ".mcap":
+        assert motion["segments"][0]["push"] is None
+    shown = dropped(f"run{ending}", path.read_bytes(), scene=document)
+    assert shown["runs"][0]["motion"]["object"] == motion["object"]
+
+
+def test_the_wrench_of_an_arc_lies_on_the_limit_surface_where_its_twist_stands_normal(planner, document):
+    """Forces are told by the greatest force and moments by the greatest moment; of the ellipsoid of this scene these
+    are its half axes, so that on it the shares have the length 1."""
+    plan = fp.plan(parse_scene(document))
+    push = plan.pushes[0]
+    shown = json.loads(json.dumps(mechanics(plan.scene, push.push, push.arcs), allow_nan=False))
+    found = surface_of(plan.scene.object, "ellipsoid", np.array([0.0, 1.0]))
+    scale = np.abs(np.diag(found.wrench(np.eye(3))))
+    assert len(shown["arcs"]) == len(push.arcs)
+    for arc, told in zip(push.arcs, shown["arcs"], strict=True):
+        wrench = np.array(told["wrench"]) * scale
+        assert found.value(wrench) == pytest.approx(1, abs=1e-3)
+        V, W = found.twist(wrench), shift_twist(arc.twist, plan.scene.object.cof)
+        size = np.array([1, 1, 0.02])
+        assert (V * size) @ (W * size) == pytest.approx(
+            np.linalg.norm(V * size) * np.linalg.norm(W * size), rel=1e-4
+        )
+        x, y = (np.array(shown["contact"]) / 1e3 - plan.scene.object.cof).tolist()
+        moved = np.array([W[0] - W[2] * y, W[1] + W[2] * x])
+        np.testing.assert_allclose(told["u"], moved / np.hypot(*moved), atol=1e-4)
+        assert np.degrees(np.arccos(np.dot(told["force"], [0, 1]))) < np.degrees(np.arctan(0.3)) + 0.01
+        np.testing.assert_allclose(told["force"], wrench[:2] / np.hypot(*wrench[:2]), atol=1e-3)
+    for points in (*shown["mesh"], shown["edge"]):
+        np.testing.assert_allclose(found.value(np.array(points) * scale), 1, atol=5e-3)
+    for ray, centre in zip(shown["rays"], shown["centres"], strict=True):
+        np.testing.assert_allclose(ray["points"][0], centre["at"], atol=1e-6)
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -235,8 +235,13 @@ def _from_robot(source: str, skip_bad: bool) -> MotionFile:
     return MotionFile(tuple(motions), log.left_out, of_hand=True)
 
 
-def _from_bag(source: str) -> MotionFile:
-    """The poses on the two topics, the finger's interpolated at the times of the object's."""
+def bag_messages(source: str, topics: Sequence[str]) -> Iterator[tuple[str, float, list[float], str]]:
+    """Topic and time [s] of the messages of an MCAP bag, with the pose (x, y, turn about z, z) or the text of each.
+
+    Raises:
+        MissingExtra: without the libraries.
+        InputError: for what is no such bag.
+    """
     try:
         from mcap.reader import make_reader
         from rosbags.typesys import Stores, get_typestore
@@ -245,19 +250,28 @@ def _from_bag(source: str) -> MotionFile:
             'a recording in .mcap needs mcap and rosbags: pip install "flatpush[export]"'
         ) from None
     store = get_typestore(Stores.ROS2_HUMBLE)
-    found: dict[str, list[list[float]]] = {topic: [] for topic in TOPICS}
     try:
         with open(source, "rb") as file:
-            for schema, channel, message in make_reader(file).iter_messages(topics=list(TOPICS)):
-                pose = store.deserialize_cdr(message.data, schema.name if schema else "").pose
-                turn = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
-                found[channel.topic].append(
-                    [1e-9 * message.log_time, pose.position.x, pose.position.y, turn, pose.position.z]
-                )
+            for schema, channel, raw in make_reader(file).iter_messages(topics=list(topics)):
+                message = store.deserialize_cdr(raw.data, schema.name if schema else "")
+                if hasattr(message, "pose"):
+                    place, way = message.pose.position, message.pose.orientation
+                    pose, text = [place.x, place.y, 2 * math.atan2(way.z, way.w), place.z], ""
+                else:
+                    pose, text = [], str(message.data)
+                yield channel.topic, 1e-9 * raw.log_time, pose, text
     except OSError as error:
         raise InputError(f"it cannot be read ({error.strerror})", source=source) from None
     except Exception as error:  # whatever a damaged bag makes its reader raise
         raise InputError(f"this is not a bag of poses ({type(error).__name__})", source=source) from None
+
+
+def _from_bag(source: str) -> MotionFile:
+    """The poses on the two topics, the finger's interpolated at the times of the object's."""
+    found: dict[str, list[list[float]]] = {topic: [] for topic in TOPICS}
+    for topic, stamp, pose, _ in bag_messages(source, TOPICS):
+        x, y, turn, z = pose
+        found[topic].append([stamp, x, y, turn, z])
     seen, tool = (np.array(found[topic]) for topic in TOPICS)
     if len(seen) < 2 or len(tool) < 2:
         raise InputError(f"the bag holds no poses on {' and '.join(TOPICS)}", source=source)

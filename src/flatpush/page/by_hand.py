@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arguments import vector
 from ..documents import parse_scene
 from ..errors import InputError
 from ..geometry import compose, inverse, log, rotate, shift_twist, transform
@@ -15,6 +14,7 @@ from ..simulation.plant import Plant
 from ..view import words
 from ..view.table import MM
 from .in_mm import refuse_files
+from .values import number_of, numbers_of, scene_of
 
 LONGEST_WAY, LONGEST_TIME = 0.2, 0.5  # of one step: a page that was asleep does not make up for it [m], [s]
 DIGITS = 7  # of a place [mm]: less would part finger and object
@@ -50,13 +50,12 @@ class ByHand:
         Raises:
             InputError: for anything that is not that.
         """
-        plant = self._plant_of(value.get("scene"))
-        pose = _numbers(value.get("object"), 3, "object") / [MM, MM, 1.0]
-        start, end = _numbers(value.get("way"), 4, "way").reshape(2, 2) / MM
-        seconds = value.get("seconds")
-        if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
+        plant = self._plant_of(scene_of(value))
+        pose = numbers_of(value, "object", 3) / [MM, MM, 1.0]
+        start, end = numbers_of(value, "way", 4).reshape(2, 2) / MM
+        seconds = min(number_of(value, "seconds"), LONGEST_TIME)
+        if seconds <= 0:
             raise InputError("a step takes a positive time", key="seconds", value=seconds)
-        seconds = min(float(seconds), LONGEST_TIME)
         way = end - start
         way *= min(1.0, LONGEST_WAY / max(float(np.hypot(*way)), 1e-12))
         # Where it only lands it must not stand on the object; on its way it keeps what rounding takes away.
@@ -89,9 +88,7 @@ class ByHand:
             }
         return found
 
-    def _plant_of(self, scene: object) -> Plant:
-        if not isinstance(scene, dict):
-            raise InputError("a scene is a mapping of keys to values", key="scene", value=scene)
+    def _plant_of(self, scene: Mapping[str, object]) -> Plant:
         key = json.dumps(
             {name: part for name, part in scene.items() if name in ("object", "pusher", "planning")}
         )
@@ -102,10 +99,6 @@ class ByHand:
             self._plant = Plant(asked.object, [[0.0, 0.0]], asked.pusher.tip_radius, model=model)
             self._key = key
         return self._plant
-
-
-def _numbers(value: object, count: int, key: str) -> Array:
-    return vector(value, count, f"{count} finite numbers are needed", key)  # type: ignore[arg-type]
 
 
 def _shown(pose: Array) -> list[float]:

@@ -12,15 +12,18 @@ from ..documents.shapes import Choice, load_drawing
 from ..errors import InputError
 from ..problem import Plan
 from .in_mm import refuse_files, scene_in_mm
+from .recorded import LOGS, recorded
+from .values import scene_of
 
 DRAWINGS, BITMAPS, DOCUMENTS = (".svg", ".dxf"), (".png",), (".yaml", ".yml", ".json")
+Dropped = tuple[dict[str, object], Plan | None]
 UNIT = 1e-3  # of a drawing that does not say its own [m]
 PIXEL = 0.4e-3  # side of a pixel of a bitmap unless the page says otherwise [m]
 
 
-def read_dropped(value: Mapping[str, object]) -> dict[str, object]:
-    """A dropped file {name, data (base64), pixel [mm]}: a whole scene, or the outline of an object about its
-    centroid, in mm.
+def read_dropped(value: Mapping[str, object]) -> Dropped:
+    """A dropped file {name, data (base64), pixel [mm], scene}: a whole scene, the outline of an object about its
+    centroid in mm, or the recorded runs of a log of the object of the scene; and the plan if it is one.
 
     Raises:
         InputError: for what is none of these.
@@ -31,11 +34,11 @@ def read_dropped(value: Mapping[str, object]) -> dict[str, object]:
     if isinstance(pixel, bool) or not isinstance(pixel, int | float) or not 0 < pixel <= 1000:
         raise InputError("the side of a pixel is a length in mm", key="pixel", value=pixel)
     kind = Path(name).suffix.lower()
-    if kind not in (*DRAWINGS, *BITMAPS, *DOCUMENTS):
+    if kind not in (*DRAWINGS, *BITMAPS, *DOCUMENTS, *LOGS):
         raise InputError(
             "this is no kind of file that the page reads",
             value=name,
-            hint="Drop a scene or a plan (.yaml, .json) or a drawing (.svg, .dxf, .png).",
+            hint="Drop a scene or a plan (.yaml, .json), a drawing (.svg, .dxf, .png) or a log (.csv, .mcap).",
         )
     try:
         content = base64.b64decode(data, validate=True)
@@ -45,7 +48,12 @@ def read_dropped(value: Mapping[str, object]) -> dict[str, object]:
         path = Path(folder, f"dropped{kind}")
         path.write_bytes(content)
         try:
-            return {"kind": "file", "name": name, **_read(path, kind, 1e-3 * float(pixel))}
+            if kind in LOGS:
+                scene = scene_of(value)
+                refuse_files(scene)
+                return {"kind": "file", "name": name, "runs": recorded(path, parse_scene(scene))}, None
+            found, plan = _read(path, kind, 1e-3 * float(pixel))
+            return {"kind": "file", "name": name, **found}, plan
         except InputError as error:
             raise InputError(
                 error.rule.replace(str(path), name),
@@ -56,17 +64,17 @@ def read_dropped(value: Mapping[str, object]) -> dict[str, object]:
             ) from None
 
 
-def _read(path: Path, kind: str, pixel: float) -> dict[str, object]:
+def _read(path: Path, kind: str, pixel: float) -> Dropped:
     if kind in DOCUMENTS:
         document = read_mapping(path)
         refuse_files(document)
         version = document.get("flatpush")
-        plan = isinstance(version, str) and version.startswith("plan/")
-        return {"scene": scene_in_mm(parse_plan(document).scene if plan else parse_scene(document))}
+        plan = parse_plan(document) if isinstance(version, str) and version.startswith("plan/") else None
+        return {"scene": scene_in_mm(parse_scene(document) if plan is None else plan.scene)}, plan
     choice = Choice(origin="centroid", pixel=pixel if kind in BITMAPS else 0.0)
     drawn = load_drawing(path, UNIT, choice)
     corners = [[round(1e3 * x, 4), round(1e3 * y, 4)] for x, y in drawn.outline.vertices.tolist()]
-    return {"outline": corners, "taken": drawn.taken, "left_out": len(drawn.left_out)}
+    return {"outline": corners, "taken": drawn.taken, "left_out": len(drawn.left_out)}, None
 
 
 def saved(value: Mapping[str, object], plan: Plan | None) -> dict[str, object]:
@@ -75,12 +83,11 @@ def saved(value: Mapping[str, object], plan: Plan | None) -> dict[str, object]:
     Raises:
         InputError: for a scene that is none, and where there is no plan.
     """
-    what, scene = value.get("what"), value.get("scene")
+    what = value.get("what")
     if what not in ("scene", "plan", "figure"):
         raise InputError("a scene, a plan or a figure is saved", key="what", value=what)
     if what == "scene":
-        if not isinstance(scene, dict):
-            raise InputError("a scene is a mapping of keys to values", key="scene", value=scene)
+        scene = scene_of(value)
         refuse_files(scene)
         parse_scene(scene)
         return {"kind": "saved", "name": f"{_stem(scene)}.yaml", "text": _yaml(scene)}

@@ -32,6 +32,15 @@ class LivePlanner:
 
     def __init__(self) -> None:
         self._known: OrderedDict[str, _Prepared] = OrderedDict()
+        self._stored: list[tuple[Mapping[str, object], Plan]] = []
+
+    def keep(self, document: Mapping[str, object], plan: Plan) -> None:
+        """Remembers a plan that was not made here, and the document of its scene."""
+        self._stored = [(document, plan), *self._stored][:KEPT]
+
+    def kept(self, document: Mapping[str, object]) -> Plan | None:
+        """The plan that was remembered for exactly this document."""
+        return next((plan for known, plan in self._stored if known == document), None)
 
     def answers(
         self, document: Mapping[str, object], progress: Progress | None = None

@@ -8,8 +8,9 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from importlib.resources import files
 from itertools import count
 from multiprocessing.connection import Connection
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from ..errors import FlatpushError, InputError, MissingExtra
+from ..problem import Plan
 from .options import Options
 from .worker import work
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 3_000_000  # of a message
 RATE, BURST = 150.0, 300.0  # messages a second that a page may send, and at once
-KINDS = "plan", "file", "save", "hand", "mechanics"
+KINDS = "plan", "file", "save", "hand", "mechanics", "follow", "on", "runs"
 TRIES = 30  # ports
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _IN_USE = (errno.EADDRINUSE, errno.EACCES)
@@ -44,11 +46,26 @@ HEADERS = {
 Message = Mapping[str, object]
 
 
-def serve(scene: Message, options: Options, told: Callable[[str], None]) -> None:
-    """Serves the page with a scene, a document as in_mm has it, until it is interrupted.
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the page shows first.
+
+    Attributes:
+        scene: a document as in_mm has it.
+        plan: of that scene, shown until something is changed.
+        runs: recorded ones, as recorded.py has them.
+    """
+
+    scene: Message
+    plan: Plan | None = None
+    runs: Sequence[Message] = ()
+
+
+def serve(shown: Shown, options: Options, told: Callable[[str], None]) -> None:
+    """Serves the page until it is interrupted.
 
     Args:
-        scene: what the page shows first.
+        shown: what the page shows first.
         options: how it is served.
         told: called with lines for people: the link, and what went otherwise than asked.
 
@@ -57,7 +74,7 @@ def serve(scene: Message, options: Options, told: Callable[[str], None]) -> None
         InputError: if no port is free or the address is not one of this machine.
         KeyboardInterrupt: when it is interrupted.
     """
-    planner = Planner()  # first of all: it starts while the server does
+    planner = Planner(shown)  # first of all: it starts while the server does
     try:
         import uvicorn
         from starlette.applications import Starlette as _  # noqa: F401
@@ -70,7 +87,7 @@ def serve(scene: Message, options: Options, told: Callable[[str], None]) -> None
     host = f"[{options.host}]" if ":" in options.host else options.host
     link = f"http://{host}:{port}/?token={token}"
     try:
-        app = application(scene, planner, token, {host, "localhost"} if _is_local(options.host) else set())
+        app = application(shown, planner, token, {host, "localhost"} if _is_local(options.host) else set())
         server = uvicorn.Server(
             uvicorn.Config(
                 app,
@@ -92,7 +109,7 @@ def serve(scene: Message, options: Options, told: Callable[[str], None]) -> None
         listening.close()
 
 
-def application(scene: Message, planner: "Planner", token: str, hosts: set[str]) -> "Starlette":
+def application(shown: Shown, planner: "Planner", token: str, hosts: set[str]) -> "Starlette":
     """The application; a request shows the token, and its host and its origin are among the given ones (none: any)."""
     from starlette.applications import Starlette
     from starlette.responses import PlainTextResponse, Response
@@ -123,7 +140,7 @@ def application(scene: Message, planner: "Planner", token: str, hosts: set[str])
             await socket.close(1008)
             return
         await socket.accept()
-        await Talk(socket, planner, next(clients), scene).run()
+        await Talk(socket, planner, next(clients), shown).run()
 
     @asynccontextmanager
     async def lifespan(_: "Starlette") -> "AsyncIterator[None]":
@@ -141,7 +158,8 @@ def application(scene: Message, planner: "Planner", token: str, hosts: set[str])
 class Planner:
     """The worker process and who waits for its answers."""
 
-    def __init__(self) -> None:
+    def __init__(self, shown: Shown) -> None:
+        self._shown = shown
         self._start()
         self._waiting: dict[int, asyncio.Queue[Message]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -153,6 +171,9 @@ class Planner:
         self._process = context.Process(target=work, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()
+        if self._shown.plan is not None:
+            kept = {"document": self._shown.scene, "plan": self._shown.plan}
+            self._requests.send((0, 1, "keep", kept))
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """From now on answers go to the queues of this loop."""
@@ -209,8 +230,8 @@ class Planner:
 class Talk:
     """One page that is open: its messages are checked here, and answered by the worker."""
 
-    def __init__(self, socket: "WebSocket", planner: Planner, client: int, scene: Message) -> None:
-        self._socket, self._planner, self._client, self._scene = socket, planner, client, scene
+    def __init__(self, socket: "WebSocket", planner: Planner, client: int, shown: Shown) -> None:
+        self._socket, self._planner, self._client, self._shown = socket, planner, client, shown
         self._left, self._last = BURST, time.monotonic()
 
     async def run(self) -> None:
@@ -220,7 +241,10 @@ class Talk:
 
         answers = self._planner.join(self._client)
         try:
-            await self._send({"kind": "hello", "scene": self._scene, "words": vocabulary()})
+            shown = self._shown
+            await self._send(
+                {"kind": "hello", "scene": shown.scene, "runs": shown.runs, "words": vocabulary()}
+            )
             if self._planner.compiling is not None:
                 await self._send(self._planner.compiling)
             sending = asyncio.create_task(self._forward(answers))

@@ -8,10 +8,14 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
 
 from .. import compiling
 from ..errors import FlatpushError, InputError
 from ..problem import Plan
+
+if TYPE_CHECKING:
+    from .feedback import Followed
 
 PAUSE = 0.06  # without a newer request, after which better plans are sought [s]
 PATIENCE = 0.4  # for a first plan, after which a newer request comes first [s]
@@ -27,6 +31,7 @@ class Superseded(Exception):
 class _Job:
     client: int
     number: int
+    kind: str
     answers: Iterator[Answer]
 
 
@@ -46,7 +51,8 @@ class _Worker:
         self._requests = requests
         self._new: dict[tuple[int, str], Request] = {}  # the newest of each client and kind
         self._plan: dict[int, Plan] = {}  # the last that was solved
-        self._going_on: dict[int, _Job] = {}
+        self._followed: dict[int, Followed] = {}
+        self._going_on: dict[tuple[int, str], _Job] = {}
         self._waiting = set[int]()  # clients that have no answer yet
         from .by_hand import ByHand
         from .live import LivePlanner
@@ -68,7 +74,7 @@ class _Worker:
         if self._new:
             self._begin(self._new.pop(next(iter(self._new))))
         elif self._going_on:
-            self._go_on(next(iter(self._going_on.values())))
+            self._go_on(next(reversed(self._going_on.values())))
 
     def _take(self, wait: float | None) -> None:
         """Takes what has come, after waiting for it so long [s], or until something comes."""
@@ -82,25 +88,26 @@ class _Worker:
     def _begin(self, request: Request) -> None:
         client, number, kind, value = request
         if kind == "left":
-            for known in (self._going_on, self._plan):
-                known.pop(client, None)
+            self._followed.pop(client, None)
+            self._plan.pop(client, None)
+            for job in ("plan", "runs"):
+                self._going_on.pop((client, job), None)
+            return
+        if kind == "keep":
+            document, plan = value["document"], value["plan"]
+            assert isinstance(document, Mapping)
+            assert isinstance(plan, Plan)
+            self._planner.keep(document, plan)
+            return
+        if kind == "runs":
+            self._end_search(client)
+            self._going_on[client, kind] = _Job(client, number, kind, self._runs(client, value))
             return
         if kind != "plan":
-            from .files import read_dropped, saved
-
-            answer: Answer
-            try:
-                if kind == "hand":
-                    answer = self._hand.step(value)
-                elif kind == "mechanics":
-                    answer = self._mechanics(value)
-                else:
-                    answer = read_dropped(value) if kind == "file" else saved(value, self._plan.get(client))
-            except FlatpushError as error:
-                answer = {"kind": "error", "reason": str(error)}
-            self._requests.send((client, number, answer))
+            self._requests.send((client, number, self._answer(client, kind, value)))
             return
-        self._going_on.pop(client, None)
+        for job in ("plan", "runs"):
+            self._going_on.pop((client, job), None)
         self._waiting.add(client)
         began = time.perf_counter()
 
@@ -111,7 +118,60 @@ class _Worker:
                 if self._new:
                     raise Superseded
 
-        self._step(_Job(client, number, self._plans(client, value, hurry)))
+        self._step(_Job(client, number, kind, self._plans(client, value, hurry)))
+
+    def _answer(self, client: int, kind: str, value: Mapping[str, object]) -> Answer:
+        """The answer to what is done at once."""
+        from .files import read_dropped, saved
+        from .in_mm import scene_in_mm
+
+        try:
+            match kind:
+                case "hand":
+                    return self._hand.step(value)
+                case "mechanics":
+                    return self._mechanics(client, value)
+                case "follow":
+                    return self._follow(client, value)
+                case "on":
+                    if client not in self._followed:
+                        raise InputError("nothing is followed")
+                    return self._followed[client].on(value)
+                case "save":
+                    return saved(value, self._plan.get(client))
+            answer, plan = read_dropped(value)
+            if plan is not None:
+                self._planner.keep(scene_in_mm(plan.scene), plan)
+            return answer
+        except FlatpushError as error:
+            return {"kind": "refused" if kind in ("follow", "on") else "error", "reason": str(error)}
+
+    def _shown(self, client: int) -> Plan:
+        if client not in self._plan:
+            raise InputError("there is no plan yet")
+        return self._plan[client]
+
+    def _follow(self, client: int, value: Mapping[str, object]) -> Answer:
+        from .feedback import Followed
+
+        plan = self._shown(client)
+        self._end_search(client)
+        self._followed[client] = Followed(plan, value)
+        return {"kind": "follows"}
+
+    def _runs(self, client: int, value: Mapping[str, object]) -> Iterator[Answer]:
+        from .many_runs import many_runs
+
+        try:
+            yield from many_runs(self._shown(client), value)
+        except FlatpushError as error:
+            yield {"kind": "error", "reason": str(error)}
+
+    def _end_search(self, client: int) -> None:
+        """What is tried is the plan that is shown: no better one is sought meanwhile."""
+        job = self._going_on.pop((client, "plan"), None)
+        if job is not None:
+            self._requests.send((client, job.number, {"kind": "done"}))
 
     def _go_on(self, job: _Job) -> None:
         while self._step(job):
@@ -125,27 +185,40 @@ class _Worker:
             answer = next(job.answers, None)
         except Superseded:
             self._waiting.discard(job.client)
-            self._going_on.pop(job.client, None)
+            self._going_on.pop((job.client, job.kind), None)
             self._requests.send((job.client, job.number, {"kind": "superseded"}))
             return False
-        self._waiting.discard(job.client)
+        if job.kind == "plan":
+            self._waiting.discard(job.client)
         if answer is None:
-            self._going_on.pop(job.client, None)
-            self._requests.send((job.client, job.number, {"kind": "done"}))
+            self._going_on.pop((job.client, job.kind), None)
+            if job.kind == "plan":
+                self._requests.send((job.client, job.number, {"kind": "done"}))
             return False
         self._requests.send((job.client, job.number, answer))
-        self._going_on[job.client] = job
+        self._going_on[job.client, job.kind] = job
         return True
 
     def _plans(
         self, client: int, document: Mapping[str, object], hurry: Callable[..., None]
     ) -> Iterator[Answer]:
+        from ..simulation import verify
         from .in_mm import refuse_files
         from .picture import picture
 
         began = compiling.clock()
         try:
             refuse_files(document)
+            kept = self._planner.kept(document)
+            if kept is not None:
+                self._plan[client] = kept
+                shown = {"kind": "plan", **picture(kept), "planning_time": None}
+                yield {**shown, "stored": "stored"}
+                known = () if kept.certificate is None else kept.certificate.warnings
+                failed = [f"it does not hold: {claim.name}" for claim in verify(kept).failed]
+                said = "stored, fails verification" if failed else "stored and verified"
+                yield {**shown, "stored": said, "warnings": [*known, *failed]}
+                return
             for plan, options in self._planner.answers(document, hurry):
                 spent = compiling.clock() - began
                 if plan.status == "solved":
@@ -159,15 +232,19 @@ class _Worker:
             traceback.print_exc()
             yield {"kind": "plan", "status": "refused", "reason": f"the planner failed: {error!r}"}
 
-    def _mechanics(self, value: Mapping[str, object]) -> Answer:
+    def _mechanics(self, client: int, value: Mapping[str, object]) -> Answer:
         from .in_mm import refuse_files
         from .mechanics import mechanics
+        from .values import scene_of, whole_of
 
-        scene, push = value.get("scene"), value.get("push")
-        if not isinstance(scene, dict) or not isinstance(push, str):
-            raise InputError("a scene and the name of a push are needed")
+        scene, push, number = scene_of(value), value.get("push"), whole_of(value, "segment", 0, 10**6)
+        if not isinstance(push, str):
+            raise InputError("the name of a push is needed", key="push", value=push)
         refuse_files(scene)
-        return mechanics(self._planner.listed(scene), push)
+        pushes = self._plan[client].pushes if client in self._plan else ()
+        known = number < len(pushes) and pushes[number].push == push
+        arcs = pushes[number].arcs if known else ()
+        return {**mechanics(self._planner.listed(scene), push, arcs), "segment": number}
 
     def _tell_compiling(self, work: compiling.Work) -> None:
         self._requests.send(

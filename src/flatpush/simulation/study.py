@@ -133,7 +133,7 @@ def study(
         Chunk(plan, range(k, min(k + _CHUNK, runs)), seed, chosen, model, source, record)
         for k in range(0, runs, _CHUNK)
     ]
-    return _together(plan, list(spread(run_chunk, chunks)))
+    return together(plan, list(spread(run_chunk, chunks)))
 
 
 def run_chunk(chunk: Chunk) -> Runs:
@@ -155,7 +155,9 @@ def run_chunk(chunk: Chunk) -> Runs:
     )
 
 
-def _together(plan: Plan, parts: Sequence[Runs]) -> Runs:
+def together(plan: Plan, parts: Sequence[Runs]) -> Runs:
+    """The runs of several chunks, recorded if those of the first are."""
+
     def joined(name: str) -> Array:
         return np.concatenate([getattr(part, name) for part in parts])
 

@@ -85,11 +85,8 @@ def draw_tube(runs: Runs) -> Drawing:
     draw_endpoints(table, plan, Labels(table, np.concatenate(drawn)))
     for pose in runs.final[:MOST_DRAWN]:
         draw_object(table, plan.scene, pose, Look(palette.SIMULATED, 0.35, opacity=0.22), 2)
-    cof = plan.scene.object.cof
-    paths = transform(runs.object[..., :3].reshape(-1, 3), cof).reshape(*runs.object.shape[:2], 2)
-    stretches = [tube_across(MM * paths[:, first:last]) for first, last in _stretches(paths)]
-    tubes = [tube for tube in stretches if tube is not None]
-    for middle, across_way, bands in tubes:
+    found = tubes(runs)
+    for middle, across_way, bands in found:
         for low, high, opacity in bands:
             a, b = middle + low[:, None] * across_way, middle + high[:, None] * across_way
             table.area(np.concatenate([a, b[::-1]]), Look(fill=palette.SIMULATED, fill_opacity=opacity), 5)
@@ -99,11 +96,20 @@ def draw_tube(runs: Runs) -> Drawing:
     ends.axes()
     page.add(d.Text(right, top + 7, "ends of the drawing's origin", 8.0, SOFT, bold=True), 20)
     _ends(ends, runs)
-    _width(page, (left, across, PAGE - EDGE, across + ACROSS), tubes)
+    _width(page, (left, across, PAGE - EDGE, across + ACROSS), found)
     return page
 
 
 Tube = tuple[Array, Array, list[tuple[Array, Array, float]]]
+
+
+def tubes(runs: Runs) -> list[Tube]:
+    """The tube of recorded runs [mm], one for each stretch in which the object moves."""
+    assert runs.object is not None
+    cof = runs.plan.scene.object.cof
+    paths = transform(runs.object[..., :3].reshape(-1, 3), cof).reshape(*runs.object.shape[:2], 2)
+    stretches = [tube_across(MM * paths[:, first:last]) for first, last in _stretches(paths)]
+    return [tube for tube in stretches if tube is not None]
 
 
 def tube_across(paths: Array) -> Tube | None:

@@ -60,6 +60,12 @@ export function box(lines) {
 export const path = (points, closed = true) =>
   points.length ? "M" + points.map((p) => p[0].toFixed(3) + " " + p[1].toFixed(3)).join("L") + (closed ? "Z" : "") : "";
 
+/* An arrow from a point along a unit vector, so many mm long; its head has the same size on every screen. */
+export function arrow([x, y], [dx, dy], far, unit) {
+  const head = 9 * unit, ex = x + far * dx, ey = y + far * dy;
+  return `M${x} ${y}L${ex} ${ey}M${ex - head * (dx - 0.5 * dy)} ${ey - head * (dy + 0.5 * dx)}L${ex} ${ey}L${ex - head * (dx + 0.5 * dy)} ${ey - head * (dy - 0.5 * dx)}`;
+}
+
 /* Whether two outlines in W come nearer than a gap, by the circles around them. */
 export function near(one, other, gap) {
   const [a, b] = [one, other].map((line) => box([line])), mid = (r) => [(r[0] + r[2]) / 2, (r[1] + r[3]) / 2];

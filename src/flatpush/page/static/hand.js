@@ -1,6 +1,6 @@
 /* Push it yourself: the pointer is a finger, and the plant moves the object under it. */
 
-import { RAD, centroid, corners, find, number, path, radians, set, size } from "./geometry.js";
+import { RAD, arrow, centroid, corners, find, number, path, radians, set, size } from "./geometry.js";
 
 const MOST = 20000;   /* rows of a recorded run */
 
@@ -70,7 +70,7 @@ export class Hand {
     const middle = centroid(this.model.scene.object.outline), at = this.object;
     const here = [at[0] + Math.cos(at[2]) * middle[0] - Math.sin(at[2]) * middle[1], at[1] + Math.sin(at[2]) * middle[0] + Math.cos(at[2]) * middle[1]];
     this.trail.push(here);
-    if (this.finger && this.rows.length < MOST) this.rows.push([(performance.now() - this.began) / 1000, ...this.object, ...this.finger, answer.mode]);
+    if (this.finger && this.rows.length < MOST) this.rows.push([(performance.now() - this.began) / 1000, this.object, [...this.finger, 0], answer.mode]);
     this.draw(answer);
     find("hint").textContent = words(answer);
   }
@@ -85,22 +85,22 @@ export class Hand {
     const finger = this.finger || this.target;
     tip.style.display = finger ? "" : "none";
     if (finger) set(tip, { cx: finger[0], cy: finger[1], r: Math.max(scene.pusher.tip_radius, 3 * unit) });
-    const arrow = answer && answer.force && answer.point;
-    force.style.display = arrow ? "" : "none";
-    if (arrow) {
-      const [x, y] = answer.point, [fx, fy] = answer.force, far = 46 * unit, head = 9 * unit, ex = x + far * fx, ey = y + far * fy;
-      set(force, { d: `M${x} ${y}L${ex} ${ey}M${ex - head * (fx - 0.5 * fy)} ${ey - head * (fy + 0.5 * fx)}L${ex} ${ey}L${ex - head * (fx + 0.5 * fy)} ${ey - head * (fy - 0.5 * fx)}` });
-    }
+    const pushed = answer && answer.force && answer.point;
+    force.style.display = pushed ? "" : "none";
+    if (pushed) set(force, { d: arrow(answer.point, answer.force, 46 * unit, unit) });
     set(trail, { d: this.trail.length > 1 ? path(this.trail, false) : "" });
   }
 
   /* The object's pose for the scene's document: mm and degrees. */
   pose() { return [this.object[0], this.object[1], this.object[2] / RAD]; }
 
-  /* The run as a table. */
-  csv() {
-    return "t_s,object_x_mm,object_y_mm,object_angle_rad,finger_x_mm,finger_y_mm,contact\n"
-      + this.rows.map(([t, x, y, angle, fx, fy, mode]) => [t.toFixed(4), x, y, angle, fx, fy, mode].join(",") + "\n").join("");
+  /* What was done, as the player has it. */
+  get motion() {
+    const modes = [...new Set(this.rows.map((row) => row[3]))];
+    return {
+      times: this.rows.map((row) => row[0]), object: this.rows.map((row) => row[1]), pusher: this.rows.map((row) => row[2]), height: this.rows.map(() => 0),
+      segment: this.rows.map((row) => modes.indexOf(row[3])), segments: modes.map((mode) => ({ contact: mode, action: 1 })),
+    };
   }
 }
 

@@ -8,14 +8,17 @@ import { Mechanics } from "./mechanics.js";
 import { Model } from "./model.js";
 import { Panel } from "./panel.js";
 import { Player } from "./player.js";
+import { Feedback, ManyRuns, Recordings, Run, csv } from "./runs.js";
 import { Table, newOutline } from "./table.js";
 
 const model = new Model(), table = new Table(model), player = new Player(model), panel = new Panel(model, player);
 const connection = new Connection(new URLSearchParams(location.search).get("token") || "");
 const hand = table.hand = new Hand(model, table, connection);
 const mechanics = new Mechanics(model, table, connection, player);
+const run = new Run(model, player), feedback = table.feedback = new Feedback(model, connection, player, run), many = new ManyRuns(model, connection), recordings = new Recordings(model, run);
+feedback.changed = () => { player.paused = feedback.on ? () => feedback.pause() : null; show(); };
 player.moved = () => mechanics.follow();
-const state = { mechanics, latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };
+const state = { run, feedback, many, recordings, mechanics, latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };
 window.flatpush = state;   /* for whoever measures and tests */
 
 /* ---- messages of the server ---- */
@@ -32,7 +35,7 @@ function banner(text, calm = false, seconds = 0) {
 }
 
 connection.addEventListener("hello", async (event) => {
-  const { scene, words } = event.detail;
+  const { scene, words, runs } = event.detail;
   state.words = words;
   banner("");
   if (model.scene) { connection.again(); return; }
@@ -43,6 +46,7 @@ connection.addEventListener("hello", async (event) => {
     banner("The scene in this link cannot be read; this is the one that was opened.", false, 8);
   }
   model.load(first, false);
+  recordings.take(runs);
 });
 
 connection.addEventListener("closed", () => banner("The connection is lost; trying again … The scene is not lost: it stands in the link in the address bar."));
@@ -64,6 +68,7 @@ connection.addEventListener("plan", (event) => {
   } else if (plan.status === "refused" && model.plan && model.plan.status === "solved") {
     model.plan = { ...model.plan, stale: true, status: "refused", places: [] };   /* the last path stays, pale */
   } else model.plan = plan;
+  many.clear();
   panel.tell(plan);
   player.take(plan.status === "solved" ? plan : null);
   if (!table.touched && !state.answered) table.fit(); else table.drawPlan();
@@ -74,6 +79,12 @@ connection.addEventListener("plan", (event) => {
 
 connection.addEventListener("file", (event) => {
   const answer = event.detail;
+  if (answer.runs) {
+    feedback.stop();
+    recordings.take(answer.runs);
+    banner(`${answer.name}: ${answer.runs.length} recorded run` + (answer.runs.length === 1 ? "" : "s"), true, 6);
+    return;
+  }
   if (answer.scene) model.load(answer.scene);
   else {
     model.change((scene) => newOutline(scene, answer.outline, answer.name.replace(/\.[^.]*$/, "")));
@@ -96,6 +107,8 @@ function download(name, text) {
 
 model.addEventListener("changed", (event) => {
   state.busy = true;
+  if (feedback.on) { feedback.stop(); feedback.tell("The scene was changed, and the run ended."); }
+  run.hide();
   connection.plan(model.scene, event.detail.stamp);
   keep(model.scene);
   show();
@@ -108,6 +121,11 @@ function show() {
   find("push").classList.toggle("on", hand.on);
   find("push").setAttribute("aria-pressed", String(hand.on));
   find("here").hidden = !hand.on;
+  find("follow").textContent = feedback.on ? "Stop" : "Follow";
+  find("follow").classList.toggle("on", feedback.on);
+  find("back").hidden = feedback.on || !run.motion;
+  find("play").textContent = feedback.on ? (feedback.paused ? "Go on" : "Pause") : player.playing ? "Pause" : "Play";
+  if (feedback.on) find("play").disabled = false;
 }
 
 /* ---- what one can do ---- */
@@ -154,6 +172,7 @@ function nudge(dx, dy, repeat) {
 
 function turn(degrees) {
   const name = model.selected;
+  if (feedback.on) { if (feedback.pose) { const [x, y, angle] = feedback.pose; feedback.shove([x, y, angle + degrees * Math.PI / 180]); } return; }
   if (name === "start" || (name === "goal" && model.scene.goal[2] !== "free"))
     model.change((scene) => { scene[name] = turned(scene[name], scene.object.outline, degrees); });
   else if (name.startsWith("obstacle:")) {
@@ -170,6 +189,7 @@ function turn(degrees) {
 async function open(file) {
   if (file.size > 2000000) { banner(`${file.name} is larger than 2 MB.`, false, 8); return; }
   const value = { name: file.name };
+  if (/\.(csv|mcap|txt)$/i.test(file.name)) value.scene = model.scene;
   if (file.name.toLowerCase().endsWith(".png")) {
     value.pixel = await pixel(file.name);
     if (!value.pixel) return;
@@ -190,7 +210,10 @@ function pixel(name) {
 
 async function save(what) {
   if (what === "run") {
-    if (hand.rows.length) download("pushed-by-hand.csv", hand.csv()); else banner("Nothing has been pushed by hand yet.", true, 5);
+    const name = model.scene.object.name;
+    if (hand.rows.length) download("pushed-by-hand.csv", csv(hand.motion, name));
+    else if (run.motion) download("run.csv", csv(run.motion, name));
+    else banner("Nothing has been pushed by hand or followed yet.", true, 5);
     return;
   }
   if (what !== "link") { connection.send("save", { what, scene: model.scene }); return; }
@@ -207,8 +230,14 @@ async function save(what) {
 function push(on = !hand.on) {
   if (table.sketch) table.cancel();
   player.play(false);
+  feedback.stop();
   hand.turn(on);
   show();
+}
+
+function unfold(name) {
+  find(name).open = true;
+  find(name).scrollIntoView({ block: "nearest" });
 }
 
 const clicks = {
@@ -218,6 +247,14 @@ const clicks = {
     model.change((scene) => { scene.start = [rounded(x, 2), rounded(y, 2), within(rounded(angle, 2))]; });
     push(false);
   },
+  follow: () => {
+    unfold("feedback");
+    if (feedback.on) { feedback.stop(); feedback.tell("Stopped."); return; }
+    hand.turn(false); many.clear();
+    feedback.start();
+  },
+  back: () => { run.hide(); feedback.tell(""); show(); },
+  runs: () => { unfold("many"); many.start(); }, runsclear: () => many.clear(),
   undo: () => model.undo(), redo: () => model.redo(), add: addObstacle, remove,
   draw: () => { hand.turn(false); if (table.sketch) table.cancel(); else table.begin(); show(); },
   open: () => find("file").click(), help: () => find("keys").showModal(),
@@ -231,7 +268,7 @@ find("save").addEventListener("change", (event) => { save(event.target.value); e
 
 const KEYS = [
   ["Space", "play or pause"], ["← → ↑ ↓", "nudge what is selected by 1 mm, with Shift 10 mm; else step in time"], ["R", "turn what is selected by 15°, with Shift back; with Alt 1°"],
-  [", .", "previous or next segment"], ["Home End", "begin or end of the plan"], ["A", "add an obstacle"], ["Delete", "remove the selected obstacle"], ["P", "push by hand: the pointer is a finger; Escape ends it"], ["D", "draw the outline of the object; Enter closes it, Escape gives up"],
+  [", .", "previous or next segment"], ["Home End", "begin or end of the plan"], ["A", "add an obstacle"], ["Delete", "remove the selected obstacle"], ["P", "push by hand: the pointer is a finger; Escape ends it"], ["C", "follow the plan under feedback, or stop; meanwhile the arrows and R move the object"], ["M", "200 runs that differ a little"], ["D", "draw the outline of the object; Enter closes it, Escape gives up"],
   ["Tab", "select the next thing on the table"], ["F", "show everything"], ["+ −", "nearer, further away"], ["Ctrl Z", "undo"], ["Ctrl Shift Z", "redo"], ["?", "these keys"],
 ];
 find("keylist").append(...KEYS.flatMap(([key, what]) => [html("dt", {}, ...key.split(" ").flatMap((k) => [html("kbd", {}, k), " "])), html("dd", {}, what)]));
@@ -239,9 +276,9 @@ find("keylist").append(...KEYS.flatMap(([key, what]) => [html("dt", {}, ...key.s
 const step = () => Math.max(player.duration / 100, 0.02);
 const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const keys = {
-  " ": () => player.play(!player.playing), Home: () => player.show(0), End: () => player.show(player.duration), ",": () => player.jump(false), ".": () => player.jump(true),
+  " ": () => { if (feedback.on) feedback.pause(); else player.play(!player.playing); }, c: clicks.follow, m: clicks.runs, Home: () => player.show(0), End: () => player.show(player.duration), ",": () => player.jump(false), ".": () => player.jump(true),
   a: addObstacle, p: clicks.push, d: clicks.draw, f: clicks.fit, "+": clicks.nearer, "=": clicks.nearer, "-": clicks.further, "?": clicks.help, Delete: remove, Backspace: remove,
-  Enter: () => { if (table.sketch) { table.finish(); show(); } }, Escape: () => { if (table.sketch) { table.cancel(); show(); } else if (hand.on) push(false); else model.select(""); },
+  Enter: () => { if (table.sketch) { table.finish(); show(); } }, Escape: () => { if (table.sketch) { table.cancel(); show(); } else if (feedback.on) clicks.follow(); else if (hand.on) push(false); else if (run.motion) clicks.back(); else if (many.told) many.clear(); else model.select(""); },
 };
 
 document.addEventListener("keydown", (event) => {
@@ -256,6 +293,7 @@ document.addEventListener("keydown", (event) => {
   if (arrow) {
     event.preventDefault();
     const far = event.shiftKey ? 10 : 1;
+    if (feedback.on) { const [x, y, angle] = feedback.pose || [0, 0, 0]; feedback.shove([x + far * arrow[0], y + far * arrow[1], angle]); return; }
     if (!nudge(far * arrow[0], far * arrow[1], event.repeat) && arrow[0]) player.show(player.now + arrow[0] * step());
     return;
   }

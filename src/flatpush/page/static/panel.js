@@ -108,13 +108,13 @@ export class Panel {
   tell(plan) {
     const solved = plan.status === "solved";
     document.title = find("title").textContent = plan.title || `${this.model.scene.object.name}: no plan`;
-    find("subtitle").textContent = solved ? plan.subtitle : (plan.reason || "").split("\n")[0];
+    find("subtitle").textContent = solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0];
     const cost = solved ? plan.cost.split(" (")[0] : "–";
     const count = solved ? plan.traces.length : 0;
     find("cost").textContent = cost;
     find("duration").textContent = solved ? number(plan.duration, 1) + " s" : "–";
     find("count").textContent = solved ? String(count) : "–";
-    if (!plan.planning_time) find("spent").textContent = "–";
+    if (!plan.planning_time) find("spent").textContent = plan.stored ? "stored" : "–";
     else find("spent").textContent = plan.planning_time < 1 ? number(1000 * plan.planning_time, 0) + " ms" : number(plan.planning_time, 1) + " s";
     find("reason").hidden = solved;
     find("reason").textContent = solved ? "" : plan.reason;

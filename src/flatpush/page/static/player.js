@@ -5,10 +5,12 @@ import { RAD, centroid, corners, find, html, number, path, place, set, size, svg
 export class Player {
   constructor(model) {
     this.model = model;
-    this.motion = null;
+    this.motion = null;      /* what is played: the plan or a run */
+    this.planned = this.recorded = this.pushing = null;
+    this.live = false;
     this.now = 0; this.playing = false; this.last = 0;
     this.speeds = find("speed");
-    find("play").addEventListener("click", () => this.play(!this.playing));
+    find("play").addEventListener("click", () => { if (this.live && this.paused) this.paused(); else this.play(!this.playing); });
     find("scrub").addEventListener("input", (event) => { this.play(false); this.show(this.duration * event.target.value / 1000); });
   }
 
@@ -16,22 +18,45 @@ export class Player {
 
   /* Takes the motion of a plan; the time stays where it was. */
   take(plan) {
-    this.motion = plan && plan.motion ? plan.motion : null;
+    this.planned = plan && plan.motion ? plan.motion : null;
+    if (!this.recorded) this.use(this.planned);
+  }
+
+  /* Plays a run instead of the plan, from its end if it is under way; null: the plan again. */
+  record(motion, live = false, ended = live) {
+    const last = this.recorded;
+    this.recorded = motion;
+    if (!motion && !last) return;
+    this.live = live;
+    this.now = motion && ended ? motion.times[motion.times.length - 1] : 0;
+    if (live && last === motion) { this.strip(); this.show(this.now); return; }
+    this.play(false);
+    this.use(motion || this.planned);
+  }
+
+  use(motion) {
+    this.motion = motion;
     find("moving").style.display = this.motion ? "" : "none";
-    find("play").disabled = find("scrub").disabled = !this.motion || !this.motion.segments.length;
+    const live = Boolean(this.recorded && this.live), empty = !this.motion || !this.motion.segments.length;
+    find("scrub").disabled = empty || live;
+    find("play").disabled = empty && !live;
     if (!this.motion) { this.play(false); find("strip").replaceChildren(); find("time").textContent = "–"; find("mode").textContent = ""; return; }
     const { scene } = this.model, middle = centroid(scene.object.outline);
     find("object").replaceChildren(
       svg("path", { class: "body", d: path(corners(scene.object.outline)) }),
       svg("path", { class: "mark", d: `M${middle[0]} ${middle[1]}h${0.18 * size(scene.object.outline)}` }));
     for (const tip of document.querySelectorAll("#pusher .tip")) set(tip, { r: Math.max(scene.pusher.tip_radius, 0.008 * size(scene.object.outline)) });
+    this.strip();
+    this.show(this.now);
+  }
+
+  strip() {
     find("strip").replaceChildren(...this.motion.segments.map((segment, k, all) => {
       const end = k + 1 < all.length ? all[k + 1].start : this.duration, part = html("span");
       part.style.flex = (end - segment.start) + " 0 0";
       part.style.background = segment.push === null ? "transparent" : segment.colour;
       return part;
     }));
-    this.show(this.now);
   }
 
   /* The sample after the time t; where two segments meet, of the later one. */
@@ -84,6 +109,7 @@ export class Player {
     find("mode").textContent = describe(segment, turn, height);
     find("scrub").value = this.duration > 0 ? 1000 * this.now / this.duration : 0;
     set(find("scrub"), { "aria-valuetext": find("time").textContent + ", " + find("mode").textContent });
+    this.pushing = pushing && turn ? { push: segment.number - 1, arc: segment.turns.indexOf(turn) } : null;
     this.dispatch(segment);
     if (this.moved) this.moved();
   }
@@ -108,7 +134,7 @@ export class Player {
 
   play(yes) {
     this.playing = yes && this.duration > 0;
-    find("play").textContent = this.playing ? "Pause" : "Play";
+    if (!this.live) find("play").textContent = this.playing ? "Pause" : "Play";
     if (!this.playing) return;
     if (this.now >= this.duration) this.show(0);
     this.last = performance.now();
@@ -125,6 +151,7 @@ export class Player {
 
 function describe(segment, turn, height) {
   if (!segment) return "at rest";
+  if (segment.text) return segment.text;
   if (segment.push === null) return height > 1e-3 ? "pusher lifted " + number(height, 0) + " mm" : "pusher alone, on the table";
   return "push " + segment.number + " “" + segment.push + "”, " + (turn.turn === "straight" ? "straight" : "turning " + turn.turn);
 }

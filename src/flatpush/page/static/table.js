@@ -221,6 +221,11 @@ export class Table {
     const from = this.at(event), { scene } = this.model;
     this.node.setPointerCapture(event.pointerId);
     this.drag = { kind: "pan", from, view: { ...this.view }, screen, moved: false, item: "" };
+    if (this.feedback.on && this.feedback.pose && event.target.closest("#object")) {
+      this.drag = { ...this.drag, kind: "shove", pose: this.feedback.pose };
+      document.body.classList.add("dragging");
+      return;
+    }
     if (item) {
       const name = item.dataset.item;
       this.model.select(name);
@@ -254,6 +259,11 @@ export class Table {
     }
     if (!drag.moved && Math.hypot(event.clientX - drag.screen[0], event.clientY - drag.screen[1]) < 3) return;
     drag.moved = true;
+    if (drag.kind === "shove") {
+      const [x, y] = this.at(event);
+      this.feedback.shove([drag.pose[0] + x - drag.from[0], drag.pose[1] + y - drag.from[1], drag.pose[2]]);
+      return;
+    }
     if (drag.kind === "pan") {
       this.touched = true;
       this.view = { ...drag.view, x: drag.view.x - (event.clientX - drag.screen[0]) * drag.view.unit, y: drag.view.y + (event.clientY - drag.screen[1]) * drag.view.unit };
