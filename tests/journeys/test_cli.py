@@ -87,6 +87,21 @@ def test_plan_verify_simulate_export(plans, folder):
     assert len(lines) - 1 == sum(len(s["times"]) for s in document["segments"]) - junctions
 
 
+def test_a_bound_tells_how_far_the_plan_is_from_the_best(folder):
+    made = flatpush("plan", "scene.yaml", "--bound", "0.2", "-o", "plan.json", folder=folder)
+    assert made.returncode == 0
+    assert re.search(r"^at most \d+\.\d % above the least possible with these pushes", made.stdout, re.M)
+    plan = fp.load_plan(folder / "plan.json")
+    assert plan.run["bound"]["least"] <= plan.cost
+    assert fp.verify(plan).ok
+    walled = SCENE + "workspace: {bounds: [-200, -200, 200, 200]}\n"
+    (folder / "scene.yaml").write_text(walled)
+    for seconds, words in (("1", "empty table"), ("0", "positive number of seconds")):
+        ended = flatpush("plan", "scene.yaml", "--bound", seconds, folder=folder)
+        assert ended.returncode == 2
+        assert words in ended.stderr
+
+
 def test_an_edited_plan_fails_verification(plans, folder):
     document = json.loads((plans[0] / "two.json").read_text())
     document["cost"] *= 0.99

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..errors import InputError
 from .common import cost_text, error_text, goal_values, growth_text, numbers, pose_text, print_json, telling
 
 LINES = 3  # of the reason why there is no plan
@@ -49,6 +50,13 @@ def command(
     time_limit: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Cut the search short after this time.")
     ] = None,
+    bound: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help="Search so long for a lower bound on the cost, and for a cheaper plan on the way.",
+        ),
+    ] = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="If there is no plan, tell why for each push, one line each.")
     ] = False,
@@ -74,6 +82,12 @@ def command(
     }
     loaded = load_scene(scene, {key: value for key, value in overrides.items() if value})
     check_outputs(scene_files(scene), [output, figure, snapshots])
+    if bound is not None:
+        from ..planning.bound import check_bound
+
+        if not 0 < bound < math.inf:
+            raise InputError("a bound takes a positive number of seconds", key="--bound", value=bound)
+        check_bound(loaded)
     if figure is not None:
         from ..view import check_figure
 
@@ -82,7 +96,7 @@ def command(
         from ..view import check_snapshots
 
         check_snapshots(snapshots)
-    found, explored = _planned(loaded)
+    found, explored = _planned(loaded, bound)
     if found.status != "solved":
         if as_json:
             print_json(plan_document(found))
@@ -125,8 +139,8 @@ def reason_lines(reason: str, verbose: bool) -> list[str]:
     return [*lines[: LINES - 1], f"  and {len(lines) - LINES + 1} more, which --verbose or --json tells"]
 
 
-def _planned(scene: Any) -> tuple[Any, Any]:
-    """The best plan found, and the edges of the search tree or None.
+def _planned(scene: Any, seconds: float | None) -> tuple[Any, Any]:
+    """The best plan found, and the edges of the search tree or None; its bound is sought for some seconds.
 
     Ctrl-C ends the search; what has been found by then is kept. Among obstacles a line on a
     terminal shows how far the search is.
@@ -157,7 +171,41 @@ def _planned(scene: Any) -> tuple[Any, Any]:
         if shown > 0:
             sys.stderr.write("\n")
     assert best is not None  # there is always an answer
-    return best.plan(), planner.explored
+    plan = best.plan()
+    if seconds is not None and plan.segments:
+        plan = _bounded(planner, plan, seconds)
+    return plan, planner.explored
+
+
+def _bounded(planner: Any, plan: Any, seconds: float) -> Any:
+    """The plan or a cheaper one, with what is known about the least cost after some seconds or Ctrl-C."""
+    from ..compiling import clock
+    from ..planning.bound import bounded
+
+    with telling("looking for a bound"):
+        began = clock()
+        try:
+            for found in bounded(planner, plan):
+                plan = found
+                if clock() - began > seconds:
+                    break
+        except KeyboardInterrupt:
+            typer.echo("stopped: this is the best bound found so far", err=True)
+    return plan
+
+
+def _bound_text(plan: Any) -> str:
+    """How far the plan is from the cheapest one, at most, by how many changes of contact that has."""
+    known = plan.run["bound"]
+
+    def above(key: str) -> str:
+        return f"{max(math.ceil(1000 * (plan.cost / known[key] - 1) - 1e-3), 0) / 10:.1f} %"
+
+    text = f"at most {above('least')} above the least possible with these pushes"
+    for key, which in (("least_two_changes", "two changes"), ("least_one_change", "one change")):
+        if above(key) != above("least"):
+            text += f", {above(key)} above that with at most {which} of contact"
+    return text + (" (no room for a closer look)" if known["full"] else "")
 
 
 def _tell(plan: Any, written: Sequence[Path | None]) -> None:
@@ -181,6 +229,8 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
             f"stopped by time_limit ({scene.planning.time_limit:g} s) before {scene.planning.iterations} iterations:"
             " with --time-limit it would go on for cheaper plans"
         )
+    if "bound" in plan.run:
+        typer.echo(_bound_text(plan))
     single, before = plan.run.get("single_cost"), plan.run.get("cost_before_refinement")
     if single is not None and before is not None:
         kind = scene.planning.cost
