@@ -211,7 +211,7 @@ def _chains(query: Query, cost: float, numbers: tuple[int, ...]) -> "Chains":
                 query, point, (cost - switching) * speeds[pair], goal_half
             )
     flat = (n, 3 * MOST_LEGS)
-    switching = np.array([value for _, value in rows])
+    changing = np.array([value for _, value in rows])
     return Chains(
         legs,
         order,

@@ -61,7 +61,7 @@ def bounded(planner: "Planner", plan: Plan) -> Iterator[Plan]:
             "least": least, "least_one_change": min(one, cheapest.cost), "least_two_changes": min(two, cheapest.cost),
             "above": cheapest.cost / least - 1, "boxes": bound.boxes, "complete": bound.complete, "full": bound.full,
         }  # fmt: skip
-        yield replace(cheapest, run=cheapest.run | {"bound": found})
+        yield replace(cheapest, run={**cheapest.run, "bound": found})
 
 
 def _plan_of(planner: "Planner", plan: Plan, query: Query, found: "Candidate") -> Plan | None:
