@@ -215,8 +215,8 @@ def _chains(query: Query, cost: float, numbers: tuple[int, ...]) -> "Chains":
     return Chains(
         legs,
         order,
-        switching,
-        switching + way,
+        changing,
+        changing + way,
         query.start,
         middle.reshape(flat),
         half.reshape(flat),
