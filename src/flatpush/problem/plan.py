@@ -123,7 +123,7 @@ class Plan:
     certificate: Certificate | None = None
     reason: str = ""
     scene_digest: str = ""
-    run: Mapping[str, float | str | list[str] | None] = field(default_factory=dict)
+    run: Mapping[str, float | str | list[str] | Mapping[str, float] | None] = field(default_factory=dict)
 
     @property
     def pushes(self) -> tuple[PushSegment, ...]:
