@@ -271,13 +271,13 @@ def _places(scene: Path) -> Any:
     from ..friction.loads import radial_parts
     from ..friction.pressure import Feet
 
-    thing = load_scene(scene).object
+    thing = load_scene(scene, unknown=True).object
     points, weights = thing.support.feet
     if isinstance(thing.support.pressure, Feet):
         return points - thing.cof, np.eye(len(weights)), weights
-    if thing.support_word != "uniform":
+    if thing.support_word not in ("uniform", "unknown"):
         raise InputError(
-            "loads are fitted on feet, or over the whole face (support: uniform)",
+            "loads are fitted on feet, or over the whole face (support: uniform or unknown)",
             source=str(scene),
             key="object.support",
         )
@@ -290,7 +290,7 @@ def _write_scene(found: _Found, scene: Path, output: Path) -> None:
 
     note = f"{found.model} fitted to {len(found.pairs)} pairs of wrench and twist"
     if found.model == "loads" and found.loads is not None:
-        support = found.loads.support.translated(load_scene(scene).object.cof)
+        support = found.loads.support.translated(load_scene(scene, unknown=True).object.cof)
         save_fitted_scene(scene, output, support=support, note=note)
     else:
         save_fitted_scene(scene, output, surface=found.surface, note=note)

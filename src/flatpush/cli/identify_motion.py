@@ -41,7 +41,7 @@ def identify_motion(asked: Asked) -> int:
         raise InputError("the fitted scene is a YAML file", source=str(asked.output), hint="-o fitted.yaml")
     length, angle = units_of(asked.units)
     columns = own_columns(asked.columns) if asked.columns else None
-    scene = load_scene(asked.scene)
+    scene = load_scene(asked.scene, unknown=True)
     motions: list[Motion] = []
     for path in asked.data:
         file = load_motions(path, columns=columns, length=length, angle=angle, skip_bad=asked.skip_bad)

@@ -15,7 +15,8 @@ from .common import error_text, numbers, pose_text, print_json, tell_slow_way, w
 
 if TYPE_CHECKING:
     from ..control import ClosedLoopRun, ControllerState
-    from ..control.tracking.simulated_run import Law, Timing
+    from ..control.tracking.simulated_run import Law, Timing, TrackedRun
+    from ..problem import Scene
 
 CONTROLLERS = ("path", "dfl", "horizon")
 TIMINGS = ("even", "plan")
@@ -23,7 +24,10 @@ MOST_TOLD, MOST_NOTES = 8, 20
 
 
 def command(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan document (JSON).")],
+    plan: Annotated[
+        Path,
+        typer.Argument(metavar="PLAN", help="The plan document (JSON), or a scene whose support is unknown."),
+    ],
     controller: Annotated[
         str, typer.Option(metavar="NAME", help="The controller: path, dfl or horizon.")
     ] = "path",
@@ -71,6 +75,13 @@ def command(
             " above all a centre of friction that is off (--centre); where all is as told it changes little.",
         ),
     ] = False,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCENE",
+            help="The object as it truly stands, for a scene whose support is unknown; by default drawn by the seed.",
+        ),
+    ] = None,
     tolerance: Annotated[
         str | None,
         typer.Option(
@@ -83,7 +94,11 @@ def command(
     figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run as .svg or .png.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
-    """Follow PLAN under feedback, in the contact simulator with a simulated camera."""
+    """Follow PLAN under feedback, in the contact simulator with a simulated camera.
+
+    With --learn, PLAN may be a scene with support: unknown. Then the finger first makes short pushes that teach where
+    the object presses on the table, and then brings it to its goal.
+    """
     from ..control import ARRIVED, Camera
     from ..control.tracking.plan_controller import BESIDE, goal_error
     from ..control.tracking.simulated_run import TrackedRun
@@ -117,6 +132,17 @@ def command(
         seed,
         None if within is None else (within[0] / 1000, math.radians(within[1])),
     )
+    if (scene := _unknown(plan)) is not None:
+        if not learn:
+            raise InputError(
+                "this scene does not know where its object presses on the table", source=str(plan),
+                hint="Add --learn: it is learned by first pushes.",
+            )  # fmt: skip
+        if figure is not None:
+            raise InputError("--figure draws a run beside its plan, and here is none", value=str(figure))
+        return _learned(tracked, scene, table, as_json)
+    if table is not None:
+        raise InputError("--table goes with a scene whose support is unknown", value=str(table))
     loaded = load_plan(plan)
     if figure is not None:
         from ..view.picture import check_ending
@@ -151,6 +177,73 @@ def command(
         print_json(result)
     else:
         _tell(result, run, figure)
+    return 0 if run.outcome == ARRIVED else 3
+
+
+def _unknown(path: Path) -> Scene | None:
+    """The scene in a file, if it is one; else None.
+
+    Raises:
+        InputError: for a scene whose support is known: it is planned first.
+    """
+    from ..documents import load_scene, read_mapping
+
+    kind = read_mapping(path).get("flatpush") if path.suffix.lower() in (".yaml", ".yml") else None
+    if not str(kind).startswith("scene/"):
+        return None
+    scene = load_scene(path, unknown=True)
+    if scene.object.support_word != "unknown":
+        raise InputError(
+            "this is a scene, and track follows a plan", source=str(path),
+            hint="flatpush plan SCENE -o PLAN makes one; a scene is tracked if it says support: unknown.",
+        )  # fmt: skip
+    return scene
+
+
+def _learned(tracked: TrackedRun, scene: Scene, table: Path | None, as_json: bool) -> int:
+    """First pushes that teach, and then to the goal."""
+    from ..control import ARRIVED
+    from ..control.tracking.unknown_table import drawn_table, run_unknown, same_outline
+    from ..documents import load_scene
+
+    if table is None:
+        thing = drawn_table(scene.object.outline, tracked.seed)
+    else:
+        thing = load_scene(table).object
+        if not same_outline(thing.outline, scene.object.outline):
+            raise InputError(
+                "--table is a scene of the same outline", source=str(table), key="object.outline"
+            )
+    done = run_unknown(
+        scene, thing, tracked.camera, seed=tracked.seed, rate=tracked.rate, tolerance=tracked.tolerance
+    )
+    run, error = done.run, scene.goal_error(done.run.object[-1])
+    distance, turn = math.hypot(error[0], error[1]), abs(float(error[2]))
+    learned = None
+    if done.fit is not None:
+        found = done.fit.thing
+        learned = {
+            "family": done.fit.pressure.name, "friction": found.friction, "centre": found.cof.tolist(),
+            "support": [[*p, w] for p, w in zip(*(part.tolist() for part in found.support.feet), strict=True)],
+        }  # fmt: skip
+    if as_json:
+        print_json(
+            {
+                "outcome": run.outcome, "final_pose": run.object[-1].tolist(), "distance": distance, "turn": turn,
+                "time": float(run.times[-1]), "taught": done.taught, "learned": learned,
+            }
+        )  # fmt: skip
+        return 0 if run.outcome == ARRIVED else 3
+    if done.fit is not None:
+        cof = 1000 * done.fit.thing.cof
+        typer.echo(
+            f"first pushes for {done.taught:.1f} s tell: {done.fit.pressure.name}, centre of friction"
+            f" ({cof[0]:.2f} mm, {cof[1]:.2f} mm), μ {done.fit.thing.friction:.2f}"
+        )
+    typer.echo(
+        f"{run.outcome} after {run.times[-1]:.2f} s; the object is at {pose_text(run.object[-1])}, off the goal by"
+        f" {error_text(distance, turn)}"
+    )
     return 0 if run.outcome == ARRIVED else 3
 
 

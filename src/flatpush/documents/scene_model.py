@@ -210,7 +210,7 @@ ObstacleForm = Annotated[
     *forms("an obstacle", (("circle",),), listed="corners", others=("centre",)),
 ]
 SupportForm = Annotated[
-    Annotated[Literal["uniform", "outline"], Tag("<word>")]
+    Annotated[Literal["uniform", "outline", "unknown"], Tag("<word>")]
     | Annotated[FeetPart, Tag("<points>")]
     | Annotated[DiscPart, Tag("<disc>")]
     | Annotated[RingPart, Tag("<ring>")]
@@ -256,7 +256,7 @@ class ObjectPart(Part):
     )
     support: SupportForm = Field(
         default="uniform",
-        description="Where the object presses on the table: uniform, outline, "
+        description="Where the object presses on the table: uniform, outline, unknown, "
         "{points: [[x, y, weight], ...]}, {disc: r} or {ring: r}.",
     )
     friction: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = Field(

@@ -28,22 +28,27 @@ LENGTHS = (
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
 
 
-def load_scene(path: str | os.PathLike[str], changes: Mapping[str, object] | None = None) -> Scene:
+def load_scene(
+    path: str | os.PathLike[str], changes: Mapping[str, object] | None = None, *, unknown: bool = False
+) -> Scene:
     """The scene in a YAML or JSON file, in SI.
 
     Args:
         path: of the file.
         changes: keys of the document that take the place of the file's, in the file's units, as
             {"start": [60, 20, 135], "planning": {"seed": 3}}; mappings replace only the keys that they hold.
+        unknown: whether a scene is read that does not know where the object presses (support: unknown).
 
     Raises:
         InputError: for anything wrong with the file; it names the file, key, value, rule and a hint.
         MissingExtra: if the outline is a drawing and the extra "shapes" is not installed.
     """
-    return parse_scene(_merged(read_mapping(path), changes or {}), os.fspath(path))
+    return parse_scene(_merged(read_mapping(path), changes or {}), os.fspath(path), unknown=unknown)
 
 
-def parse_scene(document: Mapping[str, object], source: str = "", key: str = "") -> Scene:
+def parse_scene(
+    document: Mapping[str, object], source: str = "", key: str = "", *, unknown: bool = False
+) -> Scene:
     """The scene in a mapping that is laid out like a scene file.
 
     Lists may be tuples or arrays. Paths inside it are relative to the folder of the source.
@@ -52,6 +57,7 @@ def parse_scene(document: Mapping[str, object], source: str = "", key: str = "")
         document: the mapping.
         source: the file it came from, for errors and for relative paths.
         key: where in that file it stands, as "scene" in a plan.
+        unknown: as of load_scene.
 
     Raises:
         InputError: as load_scene.
@@ -66,6 +72,15 @@ def parse_scene(document: Mapping[str, object], source: str = "", key: str = "")
     _check_lengths(document, source, key)
     raw = _checked_version(plain(document, source, key), source, key)
     model = checked(m.SceneModel, raw, source, key)
+    if model.object.support == "unknown" and not unknown:
+        raise InputError(
+            "nothing is known yet of where this object presses on the table",
+            source=source,
+            key=join(key, "object.support"),
+            value="unknown",
+            hint="Film some pushes and run flatpush identify PUSHES --scene SCENE -o fitted.yaml, or let it learn while"
+            " it pushes: flatpush track SCENE --learn.",
+        )
     return _scene(Context(source, key, raw, PER_METRE[model.units.length], model.units.angle == "deg"), model)
 
 

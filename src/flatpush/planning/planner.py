@@ -60,6 +60,12 @@ class Planner:
 
     def __init__(self, scene: Scene, progress: Progress | None = None) -> None:
         self.left_out: tuple[PushOption, ...] = ()
+        if scene.object.support_word == "unknown":
+            raise InputError(
+                "nothing is planned for an object of which it is not known where it presses on the table",
+                key="object.support",
+                hint="fp.identification.fit_motion finds it from pushes.",
+            )
         anywhere = scene.pushes == "auto"
         if anywhere:
             pushes, self.left_out = automatic_pushes(scene)

@@ -59,7 +59,8 @@ class Object:
 
     Args:
         outline: an Outline, or the corners of a polygon [m].
-        support: where it presses on the table: "uniform", "outline", or a Support in the frame O.
+        support: where it presses on the table: "uniform", "outline", or a Support in the frame O; "unknown": nothing is
+            known of it, and it stands for "uniform" until something is.
         friction: Coulomb coefficient between fingertip and object.
         surface: a known limit surface about the centre of friction, in SI; it overrides the support's own.
         name: for people.
@@ -72,7 +73,7 @@ class Object:
     surface: LimitSurface | None = None
     name: str = "object"
     uncertainty: Uncertainty | None = None
-    support_word: str = field(default="", init=False)  # "uniform" or "outline" where one was given
+    support_word: str = field(default="", init=False)  # the word where one was given
 
     if TYPE_CHECKING:
 
@@ -422,12 +423,14 @@ def _is_nan(value: object) -> bool:
 
 
 def _support(outline: Outline, word: str) -> Support:
-    if word not in ("uniform", "outline"):
-        raise InputError('the support is "uniform", "outline" or a Support', key="object.support", value=word)
+    if word not in ("uniform", "outline", "unknown"):
+        raise InputError(
+            'the support is "uniform", "outline", "unknown" or a Support', key="object.support", value=word
+        )
     if outline.is_circle:
-        disc = Support.disc if word == "uniform" else Support.ring
+        disc = Support.ring if word == "outline" else Support.disc
         return disc(outline.radius, centre=outline.centre)
-    return (Support.polygon if word == "uniform" else Support.outline)(outline.vertices)
+    return (Support.outline if word == "outline" else Support.polygon)(outline.vertices)
 
 
 def _checked_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
