@@ -230,7 +230,7 @@ class Plant:
             raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
         n = len(objects)
         hands = np.array(hand, dtype=float)
-        hands = self._way(hands)[None] if hands.ndim == 2 else np.stack([self._way(h) for h in hands])
+        hands = self._way(hands)[None] if hands.ndim == 2 else self._way(hands, many=True)
         mus = None if friction is None else np.array(friction, dtype=float)
         centres = None if cofs is None else np.ascontiguousarray(np.array(cofs, dtype=float))
         for what, values, shape in (
@@ -262,14 +262,19 @@ class Plant:
             raise InputError("a hand is one pose, or one for each finger", value=hand)
         return hands
 
-    def _way(self, hand: ArrayLike) -> Array:
+    def _way(self, hand: ArrayLike, many: bool = False) -> Array:
         way = np.array(hand, dtype=float)
-        way = way[:, None] if way.ndim == 2 else way
-        if way.ndim != 3 or way.shape[2] != 3 or way.shape[1] not in (1, len(self.fingers)) or not len(way):
+        way = way[..., None, :] if way.ndim == 2 + many else way
+        if (
+            way.ndim != 3 + many
+            or way.shape[-1] != 3
+            or way.shape[-2] not in (1, len(self.fingers))
+            or not way.size
+        ):
             raise InputError("the hand's way is poses, shape (n, 3)", value=np.shape(hand))
         if not np.isfinite(way).all():
             raise InputError("the poses of the hand are finite numbers")
-        self._refuse_too_long(np.sum(np.abs(np.diff(way[..., :2], axis=0)), axis=0))
+        self._refuse_too_long(np.sum(np.abs(np.diff(way[..., :2], axis=-3)), axis=-3))
         return np.ascontiguousarray(way)
 
     def _refuse_too_long(self, ways: Array) -> None:
