@@ -13,10 +13,11 @@ from flatpush.control.laws.path_following import PathController
 from flatpush.control.laws.reference import AbstractReference, FlatState, PathReference, check_reference
 from flatpush.control.laws.steering_model import SteeringModel
 from flatpush.control.learning.belief import SteeringBelief
-from flatpush.control.loop.closed_loop import drive, limits_used
+from flatpush.control.loop.closed_loop import ClosedLoopRun, drive, limits_used
 from flatpush.control.loop.limits import Limits
 from flatpush.control.tracking.carried import CarriedController
 from flatpush.control.tracking.learning_controller import LearningController
+from flatpush.control.tracking.touched import touched
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, pose_error, relative, transform
 from flatpush.simulation.plant import Plant
@@ -380,3 +381,29 @@ def test_the_time_law_of_a_path_keeps_the_turn_rate(one_finger_plan):
             length, top = path.table[k, 1], path.laws[k].top
             rates.append(abs(arc.twist[2]) * arc.duration / length * top)
         assert max(rates) == pytest.approx(most)
+
+
+def test_a_run_that_touches_what_is_in_the_way_says_so(one_finger_plan):
+    """The plant knows no obstacles: what counts is when object or fingertip on the table are 0.1 mm deep in one."""
+    scene, n = one_finger_plan.scene, 300
+    corners, radius = scene.object.outline.vertices, scene.pusher.tip_radius
+    times = np.arange(n) / 60
+    x = 0.02 * times
+    still = np.zeros((n, 2))
+    object_, hand = np.column_stack([x, still]), np.column_stack([x - 0.1, still])
+    done = ClosedLoopRun(times, object_, hand, np.zeros(n), ("path",) * n, ("sticking",) * n, "arrived")
+    ahead, behind = corners[:, 0].max() + 0.05, -0.05
+    assert corners[:, 0].min() > behind + 0.001
+    wall = [(ahead, -1.0), (ahead + 0.01, -1.0), (ahead + 0.01, 1.0), (ahead, 1.0)]
+    peg = [(behind, -0.001), (behind + 0.001, -0.001), (behind + 0.001, 0.001), (behind, 0.001)]
+    for obstacles, bounds, what, reached in (
+        ([peg, wall], None, "a fingertip touched obstacle 0", 0.05 - radius),
+        ([wall], None, "the object touched obstacle 0", 0.05),
+        ([], (-1, -1, ahead, 1), "the object went over the bounds", 0.05),
+        ([], (behind - 0.06, -1, 1, 1), "", np.inf),
+    ):
+        plan = replace(one_finger_plan, scene=replace(scene, workspace=fp.Workspace(bounds, obstacles)))
+        first = times[np.argmax(x > reached + 1e-4)]
+        assert touched(plan, done) == (f"{what} after {first:.2f} s" if what else "")
+        # Lifted, and with the object at rest, nothing is touched.
+        assert touched(plan, replace(done, object=0 * object_, heights=np.ones(n))) == ""

@@ -19,6 +19,7 @@ from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.sensor import Camera, SimulatedSensor
 from .plan_controller import BESIDE, PlanController, beside, check_pushes, goal_error
 from .slides import slide_by_slide
+from .touched import touched
 
 Law = Literal["path", "dfl", "horizon"]
 Timing = Literal["even", "plan"]
@@ -60,7 +61,7 @@ class TrackedRun:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
         run = self._slid(plan) if plan.slides else drive(*self.parts(plan), self.patience(plan), told=told)
-        return replace(run, outcome=self.judged(plan, run.outcome, run.object[-1]))
+        return replace(run, outcome=touched(plan, run) or self.judged(plan, run.outcome, run.object[-1]))
 
     def judged(self, plan: Plan, outcome: str, pose: Array) -> str:
         """The outcome of a run that ended with the object at X_WO: what the controller saw is one thing, where the
