@@ -24,11 +24,12 @@ from llvmlite import binding, ir
 from numba.core import caching, compiler, event, serialize, sigutils, types
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime.nrt import rtsys
 from numba.extending import intrinsic, overload
 
 from . import compiling, kernel_store
 from .formulas import CHOICES, FORMULAS
-from .kernel_pipeline import Within
+from .kernel_pipeline import Direct, Within
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -50,7 +51,7 @@ def kernel(signature: object = None, *, fused: bool = False, lent: bool = False)
     options = _PLAIN | (_FUSED if fused else {}) | (_LENT if lent else {})
 
     def decorate(function: F) -> F:
-        made = nb.njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
+        made = nb.njit(nogil=True, no_cfunc_wrapper=True, pipeline_class=Direct, **options)(function)
         if isinstance(made, Dispatcher):  # NUMBA_DISABLE_JIT leaves functions as they are
             made._cache = _Kept(made)  # type: ignore[attr-defined]
             if signature is not None:
@@ -91,6 +92,7 @@ def shared(returns: object, *examples: object, fused: bool = False) -> Callable[
             (signature.args, signature.return_type),
             locals={},
             options=_PLAIN | (_FUSED if fused else {}),
+            pipeline_class=Direct,
         )
         made._cache = _Kept(made)  # type: ignore[attr-defined]
         made.compile()
@@ -144,7 +146,9 @@ class _Kept(caching.NullCache):
         return str(kernel_store.folder())
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()
+        rtsys.initialize(
+            target_context
+        )  # all that code from disk needs; a refresh would load what compiling needs
         compiling.begin("", 0, quiet=True)
         try:
             name = self._name(sig, target_context.codegen())
