@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flatpush as fp
-from flatpush.geometry import pose_error
+from flatpush.geometry import compose, pose_error
 
 RECTANGLE = [(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)]
 FEET = [(-0.018, -0.012), (0.02, -0.01), (0.004, 0.014), (-0.02, 0.008)]
@@ -50,6 +50,39 @@ def test_on_no_table_of_a_proved_set_does_anything_slide(plan):
         run = on(plan, loads)
         assert not [mode for mode in run.modes if mode.startswith("sliding")]
         assert pose_error(run.final_pose, end) == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+@pytest.mark.slow
+def test_an_object_off_along_its_side_stays_so_and_loses_all_other_errors(plan):
+    """On the tables at the corners of the set: from offsets within the set it ends in the box that is certified.
+
+    From starts that are off in place and angle the side comes to rest against both fingers: what is left lies along
+    it, and is no more than the start was off there, the angle at the side's distance and the gap that is closed.
+    """
+    offset = 4e-4
+    known = fp.Uncertainty(0.02, None, offset)
+    thing = replace(plan.scene.object, uncertainty=known)
+    scene = replace(plan.scene, object=thing, start=(0.05, -0.12, 0.8))
+    proved = fp.plan(scene)
+    box = np.array(proved.certificate.set_end)
+    assert box == pytest.approx([offset, 0.0], abs=1e-9)
+    _, weights = thing.support.feet
+    rng = np.random.default_rng(6)
+    ways = [(offset, 0.0, 0.0), (-offset, 0.0, 0.0)]
+    ways += [tuple(rng.uniform(-1, 1, 3) * [5e-4, 5e-4, np.deg2rad(0.5)]) for _ in range(4)]
+    for loads in list(corners(weights, 0.02))[::3]:
+        for i, way in enumerate(ways):
+            table = replace(thing, support=fp.Support.points(FEET, loads))
+            start = compose(scene.start_pose, np.array(way))
+            run = fp.simulate(replace(proved, scene=replace(proved.scene, object=table, start=start)))
+            x, y, angle = pose_error(run.final_pose, proved.scene.goal)
+            assert (y, angle) == pytest.approx((0.0, 0.0), abs=1e-6)
+            if i < 2:
+                assert abs(x) <= box[0] + 1e-7
+                assert x == pytest.approx(way[0], abs=1e-7)
+                assert "sliding" not in " ".join(run.modes)
+            else:
+                assert abs(x) <= abs(way[0]) + 0.0175 * abs(way[2]) + abs(way[1])
 
 
 def test_the_worst_table_slips_as_soon_as_the_set_is_larger(plan):

@@ -8,6 +8,7 @@ import pytest
 import flatpush as fp
 from flatpush.documents import load_plan
 from flatpush.documents.scene_reader import parse_scene
+from flatpush.errors import InputError
 from flatpush.geometry import perpendicular
 
 SCENE = {
@@ -45,6 +46,29 @@ def test_a_plan_is_proved_for_the_set_that_the_scene_states(plan, tmp_path):
     loaded = load_plan(tmp_path / "plan.json")
     assert loaded.scene.object.uncertainty == fp.Uncertainty(0.15, (0.35, 0.5), 0.0003)
     assert fp.verify(loaded).ok
+
+
+@pytest.mark.slow
+def test_the_offset_along_the_fingers_is_kept_clear():
+    """An object that may stand aside by a millimetre needs it beside obstacles; the nominal plan does not keep it."""
+    wall = [[-100, 19], [100, 19], [100, 30], [-100, 30]]
+    crowded = {**changed(offset=1.0), "workspace": {"obstacles": [wall]}, "planning": {"iterations": 300}}
+    plan = fp.plan(parse_scene(crowded))
+    certificate = plan.certificate
+    assert certificate.clearance >= 0.001
+    assert certificate.set_clearance == pytest.approx(certificate.clearance - 0.001)
+    assert sum(certificate.set_end) == pytest.approx(0.001)
+    assert fp.verify(plan).ok
+    near = {**crowded, "workspace": {"obstacles": [[[x, y - 1.2] for x, y in wall]]}}
+    with pytest.raises(
+        InputError, match=r"at the goal .* 0.30 mm from obstacle 0, and 1.00 mm .* offset along"
+    ):
+        fp.plan(parse_scene(near))
+    nominal = replace(plan.scene, planning=replace(plan.scene.planning, proof="nominal"))
+    tight = fp.plan(replace(nominal, workspace=fp.Workspace(obstacles=[np.array(wall) / 1000 - [0, 0.0012]])))
+    assert tight.certificate.set_clearance < 0
+    believed = replace(tight, scene=replace(tight.scene, planning=plan.scene.planning))
+    assert "clearance kept" in [claim.name for claim in fp.verify(believed).failed]
 
 
 def test_a_nominal_plan_is_cheaper_and_fails_the_proof(plan):

@@ -114,6 +114,12 @@ class CertificatePart(BaseModel):
     set_loads: Finite | None = Field(
         default=None, description="The largest share by which loads may differ so that the plan still holds."
     )
+    set_end: tuple[Finite, Finite] | None = Field(
+        default=None, description="Half the sides of the box about the planned end that the object ends in."
+    )
+    set_clearance: Finite | None = Field(
+        default=None, description="Clearance with any offset along the fingers."
+    )
     growth: Finite | None = Field(default=None, description="The factor by which a small error grows.")
     sensitivity: SensitivityPart | None = Field(
         default=None, description="Of a plan with slides: how far it ends elsewhere."

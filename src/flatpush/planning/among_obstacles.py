@@ -121,7 +121,7 @@ class AmongObstacles:
 
     def _checked(self, path: Path, began: float) -> tuple[Found, Segments] | None:
         """The plan of a path, if it is one as a whole, with the pusher's transits."""
-        scene, need = self.scene, self.scene.planning.clearance
+        scene, need = self.scene, self.scene.clearance
         shorter = pruned(self.queries[0], path)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if self.search.value(shorter) < self.best else path
@@ -149,7 +149,7 @@ class AmongObstacles:
     @property
     def tried(self) -> str:
         """What was tried, for a scene without a plan."""
-        search, need = self.search, 1000 * self.scene.planning.clearance
+        search, need = self.search, 1000 * self.scene.clearance
         keeping = f" with {need:.2f} mm of clearance" if need > 0 else ""
         if self.complaint and not search.nodes:
             return self.complaint

@@ -115,7 +115,7 @@ class Transits:
 
     def __init__(self, scene: Scene) -> None:
         self.pusher, self.outline = scene.pusher, scene.object.outline
-        self.gap = max(scene.planning.clearance, LEAST_GAP)
+        self.gap = max(scene.clearance, LEAST_GAP)
 
     def landing(self, placement: Placement) -> PusherPath:
         """From above the landing place (planar: from beside) onto the contact, straight along the push direction.

@@ -53,6 +53,9 @@ class Certificate:
             where it is not negative.
         set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
             offset of that set.
+        set_end: half the sides of the box in x and y about the planned end in which the object ends with any offset of
+            that set along the fingers, its angle being the planned one [m].
+        set_clearance: clearance that remains with any such offset [m].
         growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.
         sensitivity: plans with slides: how far the outline's farthest point ends elsewhere, about, if the object starts
             beside ("place") [m/m] or turned ("turn") [m/rad], the finger has more or less friction ("friction") [m],
@@ -76,6 +79,8 @@ class Certificate:
     model_offset: float | None = None
     set_margin: float | None = None
     set_loads: float | None = None
+    set_end: Vector | None = None
+    set_clearance: float | None = None
     growth: float | None = None
     sensitivity: Mapping[str, float] | None = None
     clearance: float | None = None

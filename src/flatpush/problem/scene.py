@@ -377,6 +377,12 @@ class Scene:
         return np.asarray(self.goal, dtype=float)
 
     @property
+    def clearance(self) -> float:
+        """What a plan keeps [m]: the clearance asked for, and for a set of tables the grasp's offset as well."""
+        known = self.object.uncertainty
+        return self.planning.clearance + (known.offset if known and self.planning.proof == "set" else 0.0)
+
+    @property
     def free_angle(self) -> bool:
         """Whether the object may have any angle at the goal."""
         return bool(np.isnan(self.goal_pose[2]))

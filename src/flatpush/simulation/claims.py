@@ -20,11 +20,12 @@ from ..problem.mechanics import (
     takes_cone,
     virtual_contact,
 )
+from ..problem.scene import Uncertainty
 from .clearance import clearance_of
 from .cone_margins import cone_margins
 from .margins import Margins, contact_margins, two_finger_margins, worse_of
 from .pieces import progress, turns_along
-from .proof import proof_of
+from .proof import offset_end, proof_of
 from .slides import plant_of_slides, rolled_out, sensitivity_of
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
@@ -97,7 +98,11 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
         cost += sum(float(s.times[-1]) for s in transits)
     elif scene.planning.cost == "pusher":
         cost += sum(_transit_length(s) for s in transits)
-    proof = proof_of(scene, pushes)
+    proof, clearance, known = (
+        proof_of(scene, pushes),
+        clearance_of(scene, segments),
+        scene.object.uncertainty or Uncertainty(),
+    )
     x, y, angle = (float(value) for value in scene.goal_error(pose))
     return Certificate(
         goal_error=(x, y, angle),
@@ -113,9 +118,11 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
         model_offset=worst.offset,
         set_margin=None if proof is None else proof.margin,
         set_loads=None if proof is None else proof.loads,
+        set_end=None if proof is None else offset_end(scene, pushes[-1]),
+        set_clearance=None if proof is None or clearance is None else clearance - known.offset,
         growth=growth,
         sensitivity=sensitivity_of(scene, segments),
-        clearance=clearance_of(scene, segments),
+        clearance=clearance,
         cars=cars,
         warnings=(*_warnings(growth, worst), *((LESS_CERTAIN,) if slides else ())),
     )

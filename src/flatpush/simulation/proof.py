@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import WrenchCone
 from ..contact.table_set import TableSet, shifted
 from ..errors import InputError
-from ..geometry import shift_twist
+from ..geometry import perpendicular, rotate, shift_twist
 from ..geometry.pose import Array
 from ..problem import Plan, PushSegment, Scene
 from ..problem.mechanics import contacts_of, named, placement_of
@@ -112,3 +112,17 @@ def proof_of(scene: Scene, pushes: Sequence[PushSegment]) -> Proof | None:
         tables.points + scene.object.cof,
         tables.worst(cone, twist).loads,
     )
+
+
+def offset_end(scene: Scene, push: PushSegment) -> tuple[float, float]:
+    """Half the sides, in x and y, of the box in which the object ends about the planned end of a push [m].
+
+    An object whose side rests against both fingers has lost the errors of its angle and of its distance; what stays is
+    an offset along the side, by which it is carried beside its plan, turned as planned.
+    """
+    known = scene.object.uncertainty
+    if known is None or known.offset == 0:
+        return (0.0, 0.0)
+    contacts = contacts_of(scene, placement_of(scene, named(scene, push.push)))
+    x, y = known.offset * np.abs(rotate(push.object[-1, 2], perpendicular(contacts[0].normal)))
+    return float(x), float(y)

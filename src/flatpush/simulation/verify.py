@@ -106,7 +106,7 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
         )
     clearance = computed.clearance
     if clearance is not None:
-        need = plan.scene.planning.clearance
+        need = plan.scene.clearance
         claims.append(
             Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required")
         )

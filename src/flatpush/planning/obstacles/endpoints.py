@@ -22,7 +22,7 @@ def check_endpoints(scene: Scene) -> None:
     body, every = Body.of(scene.object.outline), World.of(None, scene.workspace.obstacles)
     for key, pose in (("start", scene.start_pose), ("goal", scene.goal_pose)):
         _check_bounds(scene, key, pose)
-        if pose_clearance(every, body, pose) >= scene.planning.clearance - TOUCHING:
+        if pose_clearance(every, body, pose) >= scene.clearance - TOUCHING:
             continue
         for k, obstacle in enumerate(scene.workspace.obstacles):
             _check_obstacle(scene, key, pose, k, obstacle)
@@ -31,7 +31,7 @@ def check_endpoints(scene: Scene) -> None:
 def _check_bounds(scene: Scene, key: str, pose: Array) -> None:
     if scene.workspace.bounds is None:
         return
-    outline, need = scene.object.outline, scene.planning.clearance
+    outline, need = scene.object.outline, scene.clearance
     if outline.is_circle:
         centre = transform(pose, outline.centre)
         low, high = centre - outline.radius, centre + outline.radius
@@ -46,7 +46,7 @@ def _check_bounds(scene: Scene, key: str, pose: Array) -> None:
 
 
 def _check_obstacle(scene: Scene, key: str, pose: Array, k: int, obstacle: Outline) -> None:
-    outline, need = scene.object.outline, scene.planning.clearance
+    outline, need = scene.object.outline, scene.clearance
     room = pose_clearance(World.of(None, [obstacle]), Body.of(outline), pose)
     if room >= need - TOUCHING:
         return
@@ -60,11 +60,19 @@ def _check_obstacle(scene: Scene, key: str, pose: Array, k: int, obstacle: Outli
 
 def _refuse(scene: Scene, key: str, room: float, what: str, verb: str) -> None:
     """The complaint: by how much the object is over something, or how much less clearance it has than it should."""
-    need = 1000 * scene.planning.clearance
+    need = 1000 * scene.clearance
     if room < -TOUCHING:
         text = f"{verb} {what} by {-1000 * room:.2f} mm"
     elif verb == "overlaps":
         text = f"crosses {what}"
     else:
-        text = f"is {1000 * max(room, 0.0):.2f} mm from {what}, and {need:.2f} mm are asked for"
+        text = (
+            f"is {1000 * max(room, 0.0):.2f} mm from {what}, and {need:.2f} mm are asked for{_offset(scene)}"
+        )
     raise InputError(f"at the {key} the object {text}", key=key)
+
+
+def _offset(scene: Scene) -> str:
+    """What a set of tables adds to the clearance, in words."""
+    more = 1000 * (scene.clearance - scene.planning.clearance)
+    return f", {more:.2f} mm of them for the object's offset along the fingers" if more > 0 else ""

@@ -34,7 +34,7 @@ def query_of(scene: Scene, options: Sequence[PushOption], fleet: Fleet, goal: Ar
         World.of(scene.workspace.bounds, scene.workspace.obstacles),
         [Body.of(scene.object.outline, p.tips, pusher.tip_radius) for p in placements],
         np.array(backs),
-        scene.planning.clearance + SPARE,
+        scene.clearance + SPARE,
         free=bool(scene.goal_slack[2] >= np.pi),
         slack=scene.goal_slack,
         robust=scene.planning.robust,
@@ -45,17 +45,15 @@ def careful(scene: Scene, query: Query) -> Query:
     """The same with so much room about every change of push that the hand finds its way from any contact to any."""
     if scene.pusher.transit == "lift":
         return replace(query, inside=True)
-    gap = max(scene.planning.clearance, LEAST_GAP)
-    return replace(
-        query, room=2.05 * float(np.max(query.arrays.hands["reach"])) + 2 * gap + scene.planning.clearance
-    )
+    gap = max(scene.clearance, LEAST_GAP)
+    return replace(query, room=2.05 * float(np.max(query.arrays.hands["reach"])) + 2 * gap + scene.clearance)
 
 
 def obstructions(scene: Scene, query: Query, options: Sequence[PushOption]) -> str:
     """Why no push can begin at the start, or end at the goal; empty where some can."""
     from ...geometry.collision import pose_clearance
 
-    need = scene.planning.clearance
+    need = scene.clearance
     for name, pose, able in (("start", query.start, query.first), ("goal", query.goal, query.last)):
         if able:
             continue
