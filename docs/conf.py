@@ -20,9 +20,9 @@ html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],
-    "header_links_before_dropdown": 6,
+    "navbar_center": [],
 }
-html_sidebars = {"**": ["sidebar-nav-bs"]}
+html_sidebars = {"**": ["globaltoc.html"]}
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist"]
 # A YAML fence that shows a scene, or a sequence of them, need not be highlighted to the last letter.

@@ -10,18 +10,18 @@ def help_texts() -> dict[str, str]:
     """What `flatpush COMMAND --help` prints, by command."""
     import os
 
-    os.environ["COLUMNS"] = os.environ["TERMINAL_WIDTH"] = "100"
+    os.environ["COLUMNS"] = os.environ["TERMINAL_WIDTH"] = "76"
     import click
     from typer.main import get_command
 
     from flatpush.cli.app import app
 
     program = get_command(app)
-    context = click.Context(program, info_name="flatpush", terminal_width=100, max_content_width=100)
+    context = click.Context(program, info_name="flatpush", terminal_width=76, max_content_width=76)
     found = {}
     for name, command in program.commands.items():
         inside = click.Context(
-            command, info_name=name, parent=context, terminal_width=100, max_content_width=100
+            command, info_name=name, parent=context, terminal_width=76, max_content_width=76
         )
         found[name] = command.get_help(inside)
     return found

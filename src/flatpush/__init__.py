@@ -14,7 +14,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Name → module; loaded when first asked for, so that a program pays only for what it uses.
 _NAMES = {

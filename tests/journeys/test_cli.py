@@ -272,7 +272,7 @@ def test_help_and_version(tmp_path):
     shown = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     for command in ("plan", "verify", "simulate", "describe", "export", "init", "experiment"):
         assert command in shown.stdout
-    assert "flatpush 0.1.0" in flatpush("--version", folder=tmp_path).stdout
+    assert "flatpush 0.2.0" in flatpush("--version", folder=tmp_path).stdout
 
 
 def test_help_loads_nothing_heavy(tmp_path):

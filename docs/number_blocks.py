@@ -1,0 +1,90 @@
+"""Numbers in the documents that a command writes: python docs/number_blocks.py [--check] [BLOCK…]
+
+A block stands in a page between `<!-- numbers: NAME … -->` and `<!-- /numbers -->`. Without --check it is written anew,
+with the commit; with it a block whose words differ, or whose numbers differ by more than 2 % or a unit of their last
+digit, ends with status 1. Blocks that read recorded data are left alone where FLATPUSH_DATA names none.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+BLOCK = re.compile(r"<!-- numbers: ([\w-]+)(.*?)-->\n(.*?)<!-- /numbers -->", re.S)
+NUMBER = re.compile(r"[−-]?\d+(?:\.\d+)?(?:e-?\d+)?|[−-]?\.\d+")
+
+
+def data() -> Path | None:
+    folder = os.environ.get("FLATPUSH_DATA")
+    return Path(folder) if folder and Path(folder).is_dir() else None
+
+
+def rows(name: str) -> str:
+    """The rows of an experiment as a table: what, the paper's, ours."""
+    from flatpush.experiments.everything import Job, compute
+
+    found = compute(Job(name, quick=True, data=str(data() or ""))).finding
+    assert not found.missing, found.missing
+    lines = ["| | paper | here |", "|---|---|---|"]
+    lines += [f"| {row.what} | {row.paper} | {row.ours} |" for row in found.rows]
+    return "\n".join(lines) + "\n"
+
+
+BLOCKS: dict[str, tuple[str, Callable[[], str]]] = {
+    "stored-graphs": ("flatpush experiment stored-graphs --data DIR", lambda: rows("stored-graphs")),
+    "open-loop": ("flatpush experiment open-loop", lambda: rows("open-loop")),
+    "fig4": ("flatpush experiment fig4", lambda: rows("fig4")),
+    "duality": ("flatpush experiment duality", lambda: rows("duality")),
+}
+RECORDED = {"stored-graphs"}
+
+
+def same(one: str, other: str) -> bool:
+    """Whether two texts have the same words, and numbers as near as another machine's rounding leaves them."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    for a, b in zip(NUMBER.findall(one), NUMBER.findall(other), strict=True):
+        x, y = (float(text.replace("−", "-")) for text in (a, b))
+        mantissa, _, exponent = b.partition("e")
+        unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+        # What is rounding error anyway differs from machine to machine.
+        if abs(x - y) > max(0.02 * abs(y), 1.01 * unit) and max(abs(x), abs(y)) > 1e-6:
+            return False
+    return True
+
+
+def main(words: list[str]) -> int:
+    check, wanted = "--check" in words, [word for word in words if word != "--check"]
+    unknown = [name for name in wanted if name not in BLOCKS]
+    if unknown:
+        sys.exit(f"no such block: {', '.join(unknown)}; there are {', '.join(BLOCKS)}")
+    stale = []
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=DOCS, capture_output=True, text=True
+    ).stdout.strip()
+    for page in sorted(DOCS.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+
+        def anew(found: re.Match[str], page: Path = page) -> str:
+            name, _, old = found.groups()
+            if (wanted and name not in wanted) or (name in RECORDED and data() is None):
+                return found[0]
+            command, make = BLOCKS[name]
+            new = make()
+            if same(new, old):
+                return found[0]
+            stale.append(f"{page.name}: {name}")
+            return f"<!-- numbers: {name}, printed by `{command}` at {commit} -->\n{new}<!-- /numbers -->"
+
+        written = BLOCK.sub(anew, text)
+        if not check and written != text:
+            page.write_text(written, encoding="utf-8")
+    print("\n".join(f"{'stale' if check else 'written'}: {name}" for name in stale) or "all as printed")
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,64 @@
+"""Numbers in the documents that a command writes: compared as numbers, and the quick ones stand as printed."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "docs" / "number_blocks.py"
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    spec = importlib.util.spec_from_file_location("number_blocks", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("printed", "written", "same"),
+    [
+        ("a 10.0 mm", "a 10.1 mm", True),  # a unit of the last digit
+        ("a 10.0 mm", "a 10.4 mm", False),
+        ("a 1000 mm", "a 1015 mm", True),  # 2 %
+        ("a 1000 mm", "b 1000 mm", False),
+        ("-6.70°", "−6.71°", True),
+        ("-6.70°", "6.70°", False),
+        ("5.2e-14 mm", "1.0e-13 mm", True),  # rounding error
+        ("1 2", "1", False),
+    ],
+)
+def test_numbers_are_compared_as_numbers(blocks, printed, written, same):
+    assert blocks.same(printed, written) is same
+
+
+def test_every_block_has_a_command_and_is_filled(blocks):
+    found = {}
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        for name, told, inside in blocks.BLOCK.findall(page.read_text("utf-8")):
+            found[name] = told, inside
+    assert set(found) <= set(blocks.BLOCKS)
+    for name, (told, inside) in found.items():
+        assert blocks.BLOCKS[name][0] in told
+        assert inside.count("|") > 8
+
+
+@pytest.mark.slow
+def test_blocks_stand_as_their_commands_print_them():
+    ended = subprocess.run(
+        [sys.executable, SCRIPT, "--check"], capture_output=True, text=True, timeout=600, check=False
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
+def test_every_page_is_in_the_site_and_in_the_readme():
+    """But the site's own first page, and those that only the site can fill."""
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
+    listed = set((ROOT / "docs" / "index.md").read_text("utf-8").splitlines())
+    assert pages - listed == {"index"}
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert {page for page in pages if f"docs/{page}.md" not in readme} == {"index", "api", "cli"}
