@@ -88,7 +88,8 @@ def _tell(data: dict[str, Any]) -> None:
     typer.echo(f"{data['object']}: friction between finger and object μ = {data['friction']}")
     for line in (data["outline"] or {}).get("lines", ()):
         typer.echo(line)
-    typer.echo(f"centre of friction ({mm * cof[0]:.2f}, {mm * cof[1]:.2f}) mm in the frame of the drawing")
+    x, y = (round(mm * value, 2) + 0.0 for value in cof)  # no -0.00
+    typer.echo(f"centre of friction ({x:.2f}, {y:.2f}) mm in the frame of the drawing")
     typer.echo(
         f"second moments of the pressure xx {mm * mm * moments[0][0]:.1f}, yy {mm * mm * moments[1][1]:.1f},"
         f" xy {mm * mm * moments[0][1]:.1f} mm²"

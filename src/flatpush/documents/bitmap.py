@@ -12,7 +12,15 @@ from .reading import read_bytes
 
 TOLERANCE = 1.0  # of what is found, in pixels: half of it is the bitmap's own, half that of the smoothing
 _BLUR = 1.0  # standard deviation of the blur that takes away the steps [pixels]
-_SIMPLE = 0.25  # corners that change the outline less are left out [pixels]
+_WIDER = 2.0, 4.0, 8.0, 16.0  # of further blurs along the outline, where steps are long [pixels]
+_STEP = 0.6  # an outline that such a blur moves by less had only steps there [pixels]
+_SIMPLE = 0.15  # corners that change the outline less are left out [pixels]
+# Sides with so many pixels, straight within so many, meet in a corner if their directions differ by this sine.
+_SIDE = 12, 1.0, 0.6
+_BLUNT = (
+    0.9,
+    0.5,
+)  # by which the blur took away a corner: so much and so much over the sine of half its angle [pixels]
 _SPECK = 0.01  # what is smaller than this part of the object is dirt
 _SLACK, _BLURRED = (
     0.25,
@@ -98,7 +106,74 @@ def smooth_outline(mask: NDArray[np.bool_]) -> Array | None:
     )
     if not shapes or sum(shape.area for shape in shapes[:-1]) > _SPECK * shapes[-1].area:
         return None
-    return np.array(shapes[-1].simplify(_SIMPLE).exterior.coords)[:-1]
+    line = shapes[-1].exterior
+    count = max(int(line.length), 8)
+    even = np.array([line.interpolate(k / count, normalized=True).coords[0] for k in range(count)])
+    smooth = _without_long_steps(even)
+    sharp = Polygon(_with_sharp_corners(even, smooth))
+    best = next((shape for shape in (sharp, Polygon(smooth)) if shape.is_valid), shapes[-1])
+    return np.array(best.simplify(_SIMPLE).exterior.coords)[:-1]
+
+
+def _with_sharp_corners(points: Array, smooth: Array) -> Array:
+    """The smooth outline, with straight sides and the corner that was blurred between them where two of them meet.
+
+    Args:
+        points: a closed outline (n, 2), about one pixel apart, with its steps; smooth: the same without them.
+    """
+    from shapely import LinearRing, LineString, Point
+
+    n = len(points)
+    rough = np.array(LinearRing(points).simplify(_SIDE[1]).coords)[:-1]
+    at = sorted(int(np.argmin(np.hypot(*(points - corner).T))) for corner in rough)
+    sides = []  # first and last of its points, a point of its line, its direction
+    for first, last in zip(at, [*at[1:], at[0] + n], strict=True):
+        if last - first >= _SIDE[0]:
+            of = points[np.arange(first + 3, last - 2) % n]
+            along = np.linalg.svd(of - of.mean(axis=0))[2][0]
+            sides.append((first, last, of.mean(axis=0), along * np.sign(along @ (of[-1] - of[0]))))
+    result = smooth.copy()
+    for (first, last, p, u), (start, end, q, v) in zip(sides, [*sides[1:], *sides[:1]], strict=True):
+        start, end = start + n * (start < first), end + n * (start < first)
+        bend = float(cross(u, v))
+        if abs(bend) < _SIDE[2] or start - last > _SIDE[0]:
+            continue
+        meet = p + u * float(cross(q - p, v)) / bend
+        # The more a corner is pointed, the more of it a blur takes away; a fillet takes more.
+        half = np.sqrt(max((1 + float(u @ v)) / 2, 1e-3))  # sine of half the angle
+        between = np.arange(last - 3, start + 4) % n
+        if LineString(points[between]).distance(Point(meet)) > _BLUNT[0] + _BLUNT[1] / half:
+            continue
+        before, after = (
+            np.arange((first + last) // 2, last - 2) % n,
+            np.arange(start + 3, (start + end) // 2) % n,
+        )
+        result[before] = meet + np.minimum((result[before] - meet) @ u, 0.0)[:, None] * u
+        result[after] = meet + np.maximum((result[after] - meet) @ v, 0.0)[:, None] * v
+        result[between] = meet
+    return result
+
+
+def _without_long_steps(points: Array) -> Array:
+    """A closed outline of points one pixel apart, (n, 2), blurred along itself as far as only steps go away.
+
+    An edge that is nearly along an axis has steps many pixels long. Near corners and bends, which a wider blur would
+    move, the outline stays as it is.
+    """
+    from scipy import ndimage
+
+    def blur(values: Array, width: float) -> Array:
+        return ndimage.gaussian_filter1d(values, width, axis=0, mode="wrap")
+
+    result, clear = points, np.ones(len(points), dtype=bool)
+    for width in _WIDER:
+        once = blur(points, width)
+        wide = once + blur(points - once, width)  # twice, so that a circle keeps its radius
+        moved = np.hypot(*(wide - points).T)
+        clear &= ndimage.maximum_filter1d(moved, 2 * int(3 * width) + 1, mode="wrap") < _STEP
+        share = blur(clear.astype(float), width)[:, None]
+        result = result + np.where(clear[:, None], share, 0.0) * (wide - result)
+    return result
 
 
 def without_steps(corners: Array) -> tuple[Array, float] | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
-from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent
+from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent, flattened
 from .reading import read_bytes
 
 if TYPE_CHECKING:
@@ -231,6 +231,8 @@ def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
         entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & _FRAME_POINT]
         if not len(entity.vertices):
             return None
+    if entity.dxftype() == "SPLINE" and (unclamped := _unclamped(entity)) is not None:
+        return unclamped
     path = paths.make_path(entity)
     if not len(path):
         return None
@@ -245,3 +247,28 @@ def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
         return np.array([(p.x, p.y) for p in path.flattening(max(distance, FLATNESS**2 * size), segments=4)])
 
     return points
+
+
+def _unclamped(spline: "DXFEntity") -> Callable[[float], Array] | None:
+    """The polygon of a B-spline whose knots go beyond its ends, as those of a periodic one do; None for others.
+
+    Its curve lies between the knots of numbers p and n (degree p, n control points); ezdxf draws it over all knots.
+    """
+    knots, degree = np.array(spline.knots), int(spline.dxf.degree)
+    controls, count = np.array(spline.control_points), len(spline.control_points)
+    if not count or len(knots) != count + degree + 1:
+        return None
+    first, last = float(knots[degree]), float(knots[count])
+    if (knots[0] >= first and knots[-1] <= last) or last <= first:
+        return None
+    from scipy.interpolate import BSpline
+
+    weights = np.array(spline.weights) if len(spline.weights) == count else np.ones(count)
+    curve = BSpline(knots, np.column_stack([controls[:, :2] * weights[:, None], weights]), degree)
+
+    def at(t: Array) -> Array:
+        x, y, w = curve(first + t * (last - first)).T
+        return np.column_stack([x / w, y / w])
+
+    size = extent(controls[:, :2])
+    return lambda tolerance: flattened(at, tolerance if np.isfinite(tolerance) else 0.1 * size)

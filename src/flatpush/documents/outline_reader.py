@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -120,7 +121,7 @@ def _told(drawn: DrawnOutline, ctx: Context) -> list[str]:
     x, y = (drawn.origin * ctx.per_metre).tolist()
     turned = f", turned by {np.rad2deg(drawn.turn):.6g}°" if drawn.turn else ""
     lines = [
-        f"outline: {drawn.taken} of {drawn.source}: {n} corners within {_length(drawn.tolerance, ctx)}",
+        f"outline: {drawn.taken} of {Path(drawn.source).name}: {n} corners within {_length(drawn.tolerance, ctx)}",
         f"unit of the drawing: {unit}",
         f"frame O: origin at ({x:.6g}, {y:.6g}) {ctx.length_unit} of the drawing, y up{turned}",
     ]

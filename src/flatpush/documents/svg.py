@@ -277,7 +277,10 @@ class _Reader:
         for child in element.children:
             if child.tag not in (*_CONTAINERS, *SHAPES, *_ASIDE, "use", "foreignObject"):
                 continue
-            if child.attributes.get("systemLanguage", "").strip():
+            language = child.attributes.get("systemLanguage")
+            if language is not None and not language.strip():
+                continue  # of no language: never shown
+            if language is not None:
                 self.unreadable(child, state, "whether it is shown depends on the language of the reader")
                 return
             needs = child.attributes.get("requiredExtensions")

@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..contact.placement import SMOOTH_CORNER
+from ..friction import Support
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from ..problem import Object, Push, Scene
@@ -17,8 +18,9 @@ from .options import PushOption, push_option
 STRETCH = np.deg2rad(90.0)
 COARSE, REFINED = 9, 8
 MOST = 8
-# An outline of more corners is simplified, within this part of its size, for the search of places.
-MANY, SIMPLE = 30, 5e-4
+# An outline of more corners is simplified for the search of places: within these parts of its size, what presses on the
+# table and what the fingers touch, of which the normals are to turn in finer steps.
+MANY, SIMPLE, FINER = 30, 5e-4, 5e-5
 # Then places on a stretch are tried around the best of a quick guess, in fractions of its length, and closer by.
 AROUND, CLOSER = (0.0, -0.15, 0.15), 0.06
 # On the outline itself, places beside that are tried, in parts SIMPLE of the size.
@@ -96,9 +98,9 @@ def _automatic_pushes(scene: Scene) -> Found:
     found: list[PushOption] = []
     refused: list[PushOption] = []
     many = len(outline.vertices) > MANY
-    sought = _simplified(scene) if many else scene
-    for stretch in stretches(sought.object.outline):
-        option = _best_of_many(sought, stretch) if many else _best(scene, stretch)
+    coarse, fine = _simplified(scene) if many else (scene, scene)
+    for stretch in stretches(coarse.object.outline):
+        option = _best_of_many(coarse, fine, stretch) if many else _best(scene, stretch)
         if option is None:
             continue
         (refused if option.car is None else found).append(option)
@@ -116,14 +118,17 @@ def _automatic_pushes(scene: Scene) -> Found:
     return tuple(option.push for option in kept), tuple(refused)
 
 
-def _simplified(scene: Scene) -> Scene:
-    """The scene with an outline of fewer corners, and the support that goes with it."""
+def _simplified(scene: Scene) -> tuple[Scene, Scene]:
+    """The scene with an outline of few corners, and of some more, both on the support that goes with the first."""
     obj = scene.object
-    outline = obj.outline.simplified(SIMPLE * obj.outline.size)
-    thing = Object(
-        outline, obj.support_word or obj.support, obj.friction, obj.surface, obj.name, obj.uncertainty
-    )
-    return replace(scene, object=thing, pushes="auto")
+
+    def with_outline(tolerance: float, support: Support | str) -> Scene:
+        outline = obj.outline.simplified(tolerance * obj.outline.size)
+        thing = Object(outline, support, obj.friction, obj.surface, obj.name, obj.uncertainty)
+        return replace(scene, object=thing, pushes="auto")
+
+    coarse = with_outline(SIMPLE, obj.support_word or obj.support)
+    return coarse, with_outline(FINER, coarse.object.support)
 
 
 def _on_outline(scene: Scene, option: PushOption) -> PushOption:
@@ -176,7 +181,8 @@ def stretches(outline: Outline) -> list[Stretch]:
     n = len(normals)
     turns = np.arccos(np.clip(np.einsum("ij,ij->i", np.roll(normals, 1, axis=0), normals), -1.0, 1.0))
     sharp = np.flatnonzero(turns > SMOOTH_CORNER)
-    first = int(sharp[0]) if len(sharp) else 0
+    # Without a corner to begin at, the farthest place is in the middle of a stretch, as each side of a circle is.
+    first = int(sharp[0]) if len(sharp) else int(np.searchsorted(np.cumsum(turns), STRETCH / 2))
     lengths = np.linalg.norm(outline.edges[:, 1] - outline.edges[:, 0], axis=1)
     found: list[list[int]] = []
     turned = 0.0
@@ -204,18 +210,22 @@ def _side(inward: Array, taken: list[str]) -> str:
     return name if number == 1 else f"{name} {number}"
 
 
-def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
-    """The best place by one finger and an ellipsoid, which is quick to tell, then around it as the scene asks."""
-    nominal = _nominal(scene)
+def _best_of_many(coarse: Scene, fine: Scene, stretch: Stretch) -> PushOption | None:
+    """The best place by one finger and an ellipsoid, which is quick to tell, then around it as the scene asks.
+
+    Args:
+        coarse: the scene with an outline of few corners, to which the stretch belongs.
+        fine: the same with an outline of more corners, and the coarse one's support.
+    """
+    outline, nominal, guessed = fine.object.outline, _nominal(fine), _nominal(coarse)
     quick = replace(
-        nominal,
-        planning=replace(nominal.planning, model="ellipsoid"),
-        pusher=replace(scene.pusher, fingers=1),
+        guessed,
+        planning=replace(guessed.planning, model="ellipsoid"),
+        pusher=replace(coarse.pusher, fingers=1),
     )
     guess = _best(quick, stretch)
     if guess is None:
         return None
-    outline = scene.object.outline
     ends = np.cumsum(stretch.lengths)
     k = stretch.edges.index(guess.push.at.edge)
     along = 1 - guess.push.at.along if stretch.backwards else guess.push.at.along
@@ -225,9 +235,14 @@ def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
     places: list[float] = []
 
     def look(fraction: float) -> None:
-        at = stretch.at(outline, fraction)
-        if 0 < fraction < 1 and not at.corner and fraction not in places:
-            pusher = scene.pusher
+        if not 0 < fraction < 1 or fraction in places:
+            return
+        place = stretch.at(coarse.object.outline, fraction)
+        # A little aside, so that it is not rounding that decides between edges which are equally near.
+        aside = 0.37 * FINER * outline.size * np.array([place.normal[1], -place.normal[0]])
+        at = outline.nearest(place.point + aside)
+        if not at.corner:
+            pusher = fine.pusher
             push = Push(stretch.name, at, pusher.fingers, pusher.spacing if pusher.fingers == 2 else 0.0)
             tried.append(push_option(nominal, push, quick=True))
             places.append(fraction)
@@ -237,7 +252,7 @@ def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
     for step in AROUND:
         look(middle + step)
     if not np.isfinite(min(radii, default=np.inf)):
-        for fraction in (np.arange(COARSE) + 0.5) / COARSE:
+        for fraction in (0.01, *(np.arange(COARSE) + 0.5) / COARSE, 0.99):
             look(float(fraction))
     if not tried:
         return None
@@ -247,7 +262,7 @@ def _best_of_many(scene: Scene, stretch: Stretch) -> PushOption | None:
         for step in (-CLOSER, CLOSER):
             look(centre + step)
         best = _first(np.array(radii))
-    return _proved(scene, [tried[best], *(tried[i] for i in np.argsort(radii, kind="stable"))])
+    return _proved(fine, [tried[best], *(tried[i] for i in np.argsort(radii, kind="stable"))])
 
 
 def _nominal(scene: Scene) -> Scene:
