@@ -2,6 +2,9 @@
 
 import itertools
 import json
+import os
+import signal
+import subprocess
 import time
 
 import numpy as np
@@ -431,6 +434,33 @@ def test_two_hundred_runs_are_told_as_they_finish_and_the_page_does_not_wait(pag
     assert f"worst {errors[2]['distance']:.2f} mm" in page.text("runserrors").replace("<0.01", "0.00")
     page.click("runsclear")
     assert page.js("return document.getElementById('tube').children.length") == 0
+
+
+def test_numbers_that_are_none_are_refused_in_words_and_a_planner_that_dies_is_replaced(page):
+    for name in ("camera-delay", "runs-position"):
+        page.js("document.getElementById(arguments[0]).value = ''", name)
+    page.press("c")
+    page.wait("!flatpush.feedback.on")
+    assert page.text("followed") == "delay: a finite number is needed, got [None]"
+    page.press("m")
+    page.wait("document.getElementById('runsdone').textContent.startsWith('position: a finite')")
+    page.js("document.getElementById('camera-delay').value = 0.1")
+    page.press("c")
+    page.wait("flatpush.feedback.live.times.length > 2")
+    command = ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(page.server.process.pid)]
+    children = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    (worker,) = (int(line.split()[0]) for line in children if "spawn_main" in line)
+    os.kill(worker, signal.SIGKILL)
+    page.wait("!flatpush.feedback.on")
+    assert page.text("followed") == "The planner ended, and with it this run."
+    page.wait("!flatpush.busy && flatpush.answered > 1")
+    assert page.plan["status"] == "solved"
+    page.open()  # in the middle of a drag
+    x, y = page.middle("#start .body")
+    page.drag((x, y), (x + 60, y), drop=False)
+    page.open()
+    page.mouse("mouseReleased", x, y)
+    assert page.plan["status"] == "solved"
 
 
 # ---- a stored plan and a recorded run ----

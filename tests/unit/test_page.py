@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush import compiling
 from flatpush.control import Camera
 from flatpush.control.tracking.simulated_run import TrackedRun
 from flatpush.documents import mapping_of, parse_plan, parse_scene, scene_document, scene_template
@@ -320,6 +321,23 @@ def test_a_dropped_plan_is_the_plan_that_is_shown(short):
     found = answers_of([file, (1, 2, "plan", document)], "done")
     assert found[0]["scene"] == document
     assert found[-2]["stored"] == "stored and verified"
+
+
+def test_what_is_compiled_while_the_planner_starts_is_told(monkeypatch):
+    """It was not: the worker listened after its imports, and on a fresh machine the page said nothing for minutes."""
+
+    def starts(_):
+        compiling.begin("steering.word", 1)
+        compiling.end()
+
+    monkeypatch.setattr(LivePlanner, "__init__", starts)
+    here, there = Pipe()
+    worker._Worker(there)._silence()
+    told = [here.recv()[2] for _ in range(2)]
+    assert [(part["what"], part["done"], part["over"]) for part in told] == [
+        ("steering.word", 0, False),
+        ("steering.word", 1, True),
+    ]
 
 
 CAMERA = {"controller": "path", "delay": 0.1, "frames": 30, "noise": [0.3, 0.3], "learn": False, "seed": 3}

@@ -49,6 +49,7 @@ def work(requests: Connection) -> None:
 class _Worker:
     def __init__(self, requests: Connection) -> None:
         self._requests = requests
+        self._silence = compiling.listen(self._tell_compiling)  # kernels are compiled where they are imported
         self._new: dict[tuple[int, str], Request] = {}  # the newest of each client and kind
         self._plan: dict[int, Plan] = {}  # the last that was solved
         self._followed: dict[int, Followed] = {}
@@ -61,12 +62,11 @@ class _Worker:
 
     def run(self) -> None:
         """Until the other end is closed, which raises EOFError or OSError."""
-        silence = compiling.listen(self._tell_compiling)
         try:
             while True:
                 self._serve()
         finally:
-            silence()
+            self._silence()
 
     def _serve(self) -> None:
         if not self._new:
@@ -165,7 +165,7 @@ class _Worker:
         try:
             yield from many_runs(self._shown(client), value)
         except FlatpushError as error:
-            yield {"kind": "error", "reason": str(error)}
+            yield {"kind": "refused", "reason": str(error)}
 
     def _end_search(self, client: int) -> None:
         """What is tried is the plan that is shown: no better one is sought meanwhile."""

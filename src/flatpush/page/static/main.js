@@ -23,7 +23,7 @@ window.flatpush = state;   /* for whoever measures and tests */
 
 /* ---- messages of the server ---- */
 
-let note = 0;
+let note = 0, starting = false;   /* whether it is told that the planner is starting */
 
 function banner(text, calm = false, seconds = 0) {
   clearTimeout(note);
@@ -47,6 +47,7 @@ connection.addEventListener("hello", async (event) => {
   }
   model.load(first, false);
   recordings.take(runs);
+  setTimeout(() => { if (!state.answered && find("banner").hidden) { banner("The planner is starting. The first plan follows.", true); starting = true; } }, 1500);
 });
 
 connection.addEventListener("closed", () => banner("The connection is lost; trying again … The scene is not lost: it stands in the link in the address bar."));
@@ -54,7 +55,8 @@ connection.addEventListener("lost", () => { banner("The planner ended and begins
 connection.addEventListener("error", (event) => banner(event.detail.reason, false, 10));
 connection.addEventListener("compiling", (event) => {
   const { what, done, of, over } = event.detail;
-  banner(over ? "" : `Compiling ${what}, ${done} of ${of} (once on this machine). The first plan follows.`, true);
+  /* The next kernel often follows at once: the banner stays a moment, so that the page does not jump. */
+  banner(`Compiling ${what}, ${Math.min(done + 1, of)} of ${of} (once on this machine).${state.answered ? "" : " The first plan follows."}`, true, over ? 1.5 : 0);
 });
 connection.addEventListener("done", () => { state.busy = false; });
 
@@ -68,6 +70,7 @@ connection.addEventListener("plan", (event) => {
   } else if (plan.status === "refused" && model.plan && model.plan.status === "solved") {
     model.plan = { ...model.plan, stale: true, status: "refused", places: [] };   /* the last path stays, pale */
   } else model.plan = plan;
+  if (starting) { starting = false; banner(""); }
   many.clear();
   panel.tell(plan);
   player.take(plan.status === "solved" ? plan : null);

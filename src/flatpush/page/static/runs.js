@@ -52,8 +52,9 @@ export class Feedback {
     this.seed = 0;        /* of the camera's noise in the next run */
     connection.addEventListener("follows", () => { this.waiting = false; this.last = performance.now(); this.tick(); });
     connection.addEventListener("followed", (event) => this.followed(event.detail));
-    connection.addEventListener("refused", (event) => { this.stop(); this.tell(event.detail.reason, true); });
-    connection.addEventListener("closed", () => { if (this.on) { this.stop(); this.tell("The connection was lost, and with it this run.", true); } });
+    connection.addEventListener("refused", (event) => { if (event.detail.number === this.number) this.end(event.detail.reason); });
+    connection.addEventListener("closed", () => this.end("The connection was lost, and with it this run."));
+    connection.addEventListener("lost", () => this.end("The planner ended, and with it this run."));
   }
 
   value(id) { return find(id).valueAsNumber; }
@@ -68,7 +69,7 @@ export class Feedback {
     document.body.classList.add("following");
     this.live = { times: [], object: [], pusher: [], height: [], segment: [], segments: [] };
     this.tell("");
-    this.connection.send("follow", {
+    this.number = this.connection.send("follow", {
       controller: find("controller").value, delay: this.value("camera-delay"), frames: this.value("camera-frames"),
       noise: [this.value("camera-noise"), this.value("camera-turn")], learn: find("learn").checked, seed: this.seed++,
     });
@@ -85,6 +86,8 @@ export class Feedback {
     if (this.live.times.length > 1) this.run.show(this.live, true); else this.run.hide();
   }
 
+  end(why) { if (this.on) { this.stop(); this.tell(why, true); } }
+
   get pose() { return this.live && this.live.object.length ? this.live.object[this.live.object.length - 1] : null; }
 
   /* Somebody moves the object. */
@@ -100,7 +103,7 @@ export class Feedback {
     this.waiting = true;
     const seconds = Math.min(Math.max((now - this.last) / 1000 * Number(find("speed").value), 0.017), 0.5);
     this.last = now;
-    this.connection.send("on", { seconds, moved: this.moved });
+    this.number = this.connection.send("on", { seconds, moved: this.moved });
     this.moved = null;
   }
 
@@ -138,6 +141,8 @@ export class ManyRuns {
   constructor(model, connection) {
     this.model = model; this.connection = connection;
     this.told = null; this.number = 0;
+    connection.addEventListener("refused", (event) => { if (event.detail.number === this.number) { this.clear(); find("runsdone").textContent = event.detail.reason; } });
+    for (const end of ["lost", "closed"]) connection.addEventListener(end, () => { if (this.number && !(this.told && this.told.done === this.told.count)) this.clear(); });
     connection.addEventListener("runs", (event) => { if (event.detail.number === this.number) { this.told = event.detail; this.draw(); } });
   }
 
