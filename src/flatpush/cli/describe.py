@@ -6,16 +6,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import InputError
 from .common import print_json, telling
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..planning import PushDescription
+    from ..problem import Scene
 
 
 def command(
     scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene document, YAML or JSON.")],
     figure: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw cones and turning centres as .svg or .png.")
+    ] = None,
+    table_friction: Annotated[
+        float | None,
+        typer.Option(metavar="MU", help="Friction with the table: tells from which speed inertia counts."),
+    ] = None,
+    height: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="Height of the fingertips' contact: tells which pushes tip the object."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
@@ -34,7 +48,7 @@ def command(
         from ..view.sketches import sketches
 
         describe_figure(loaded, sketches(loaded, pushes), figure, note)
-    data = {
+    data: dict[str, Any] = {
         "object": loaded.object.name,
         "outline": None if note is None else note.data(),
         "friction": loaded.object.friction,
@@ -43,13 +57,56 @@ def command(
         "controllability": controllability([p.option.car for p in pushes if p.option.car is not None]),
         "pushes": [_push(p, turning_radii(p)) for p in pushes],
     }
+    if height is not None and table_friction is None:
+        raise InputError("whether a push tips depends on the table's friction", hint="--table-friction MU")
+    if table_friction is not None:
+        data["assumptions"] = _assumptions(loaded, pushes, table_friction, height)
     if as_json:
         print_json(data)
         return 0
     _tell(data)
+    if table_friction is not None:
+        _tell_assumptions(data["assumptions"])
     if figure is not None:
         typer.echo(f"wrote {figure}")
     return 0
+
+
+def _assumptions(
+    scene: "Scene", pushes: "Sequence[PushDescription]", table_friction: float, height: float | None
+) -> dict[str, Any]:
+    """What is assumed of speed and height, in SI."""
+    from ..problem.assumptions import coasting, quasi_static_speed, tipping_height
+
+    if height is not None and not (math.isfinite(height) and height >= 0):
+        raise InputError("a height is 0 or more", key="--height", value=height)
+    support = scene.object.support
+    return {
+        "speed": scene.pusher.speed,
+        "coasting": coasting(scene.pusher.speed, table_friction),
+        "quasi_static_speed": quasi_static_speed(table_friction),
+        "height": None if height is None else height / 1000,
+        "tipping_heights": {
+            p.push.name: tipping_height(support, p.push.at.normal, table_friction) for p in pushes
+        },
+    }
+
+
+def _tell_assumptions(found: dict[str, Any]) -> None:
+    from ..problem.assumptions import COASTS
+
+    typer.echo(
+        f"\nat {1000 * found['speed']:g} mm/s the object coasts {1000 * found['coasting']:.3f} mm when the pusher"
+        f" stops; less than {1000 * COASTS:g} mm below {1000 * found['quasi_static_speed']:.1f} mm/s"
+    )
+    if found["coasting"] > COASTS:
+        typer.echo(
+            "warning: faster than what is quasi-static; a plan's last millimetres are off by that", err=True
+        )
+    for name, limit in found["tipping_heights"].items():
+        typer.echo(f"push {name} slides the object when it is made lower than {1000 * limit:.1f} mm")
+        if found["height"] is not None and found["height"] >= limit:
+            typer.echo(f"warning: push {name} tips the object", err=True)
 
 
 def _push(described: "PushDescription", radii: dict[str, float]) -> dict[str, Any]:

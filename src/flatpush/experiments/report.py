@@ -1,11 +1,12 @@
 """The report of all experiments as one page: ours beside the paper's, every figure within, nothing to fetch."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import groupby
 
 from .everything import Done, Section
-from .finding import COLUMNS, Finding
+from .finding import COLUMNS, Finding, Row
 
 STYLE = """
 :root { --ink: #1a1a1a; --soft: #5a5a5a; --line: #dcdcdc; --paper: #ffffff; --tint: #f6f6f4; }
@@ -72,14 +73,7 @@ def _content(found: Finding) -> str:
     parts = []
     if found.rows:
         head = "".join(f"<th>{name}</th>" for name in COLUMNS)
-        rows = "".join(
-            "<tr>"
-            + "".join(
-                f"<td>{escape(value) or '—'}</td>" for value in (row.what, row.paper, row.ours, row.why)
-            )
-            + "</tr>"
-            for row in found.rows
-        )
+        rows = "".join(f"<tr>{cells}</tr>" for cells in _cells(found.rows))
         parts.append(
             f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
         )
@@ -91,6 +85,15 @@ def _content(found: Finding) -> str:
             f"<details><summary>What the command prints</summary><pre>{escape(found.table)}</pre></details>"
         )
     return "".join(parts)
+
+
+def _cells(rows: Sequence[Row]) -> Iterator[str]:
+    """The cells of each row; a reason that rows in sequence share stands once, beside all of them."""
+    for why, group in groupby(rows, key=lambda row: row.why):
+        same = list(group)
+        for k, row in enumerate(same):
+            cells = "".join(f"<td>{escape(value) or '—'}</td>" for value in (row.what, row.paper, row.ours))
+            yield cells + (f'<td rowspan="{len(same)}">{escape(why) or "—"}</td>' if k == 0 else "")
 
 
 def _figure(name: str, svg: str) -> str:
