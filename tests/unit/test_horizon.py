@@ -105,7 +105,7 @@ def test_the_rest_of_a_path_is_what_is_left_of_it():
     """A flat point that follows what it is told tick by tick ends at the goal, from near and far."""
     radius, left, right = 0.04, 30.0, 30.0
     rng = np.random.default_rng(5)
-    for _ in range(8):
+    for _ in range(4):
         pose = np.array([rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-np.pi, np.pi)])
         before, how = np.inf, "planned"
         for _ in range(4000):
@@ -210,7 +210,7 @@ def test_what_is_believed_and_seen_exactly_takes_one_landing(rate):
     assert list(dict.fromkeys(result.modes)) == ["look", "transit", "push", "retreat", "done"]
 
 
-@pytest.mark.parametrize("number", [2, 7])
+@pytest.mark.parametrize("number", [2, pytest.param(7, marks=pytest.mark.slow)])
 def test_tasks_end_within_the_tolerance_whatever_the_table(number):
     ended, result = attempt(task(number))
     assert ended.outcome == ARRIVED

@@ -44,7 +44,7 @@ def test_compiled_edges_keep_clear_where_their_displacements_do(query):
     rng = np.random.default_rng(1)
     T, fleet, drawn = query.arrays, query.fleet, np.zeros(1, WORD)
     decided = {True: 0, False: 0}
-    while sum(decided.values()) < 100:
+    while sum(decided.values()) < 60:
         a = int(rng.integers(fleet.size))
         start = rng.uniform([0, 0, -3], [0.32, 0.25, 3])
         if pose_clearance(query.world, query.bodies[a], start) < query.clearance:
@@ -56,7 +56,7 @@ def test_compiled_edges_keep_clear_where_their_displacements_do(query):
         gap = path_clearance(query.world, query.bodies[a], start, steps).distance
         decided[bool(word_clear(T, a, start, drawn, 0))] += 1
         assert word_clear(T, a, start, drawn, 0) == (gap >= query.clearance)
-    assert min(decided.values()) > 10
+    assert min(decided.values()) > 5
 
 
 def test_a_lattice_finds_the_maze_at_once_and_its_way_is_free(query):
@@ -174,7 +174,9 @@ def test_the_planner_plans_the_maze_with_a_certificate():
 
 
 def test_plans_among_obstacles_repeat():
-    one, two = (fp.Planner(maze_scene(seed=2)).plan() for _ in range(2))
+    scene = maze_scene(seed=2)
+    scene = replace(scene, planning=replace(scene.planning, iterations=100))
+    one, two = (fp.Planner(scene).plan() for _ in range(2))
     assert one.cost == two.cost
     assert [s.word for s in one.pushes] == [s.word for s in two.pushes]
 
@@ -263,16 +265,25 @@ def replanned_plainly(query, path):
                 for word in direct_paths(
                     path.fleet, off, np.tile(path.poses[i + len(leg)], (path.fleet.size, 1))
                 ):
+                    if word.pushes != (push,) or word.cost >= min(again):
+                        continue
                     steps = [word.step(*piece) for piece in word.pieces]
-                    gap = path_clearance(query.world, query.bodies[push], off, steps).distance
-                    if word.pushes == (push,) and gap >= query.clearance:
+                    if (
+                        path_clearance(query.world, query.bodies[push], off, steps).distance
+                        >= query.clearance
+                    ):
                         again.append(word.cost)
                 total += min(again) / 16
     return total
 
 
-def test_robust_paths_cost_little_more_and_replan_cheaply():
-    nominal, robust = searched(crossing(), 0, 20_000), searched(crossing(robust=True), 0, 20_000)
+@pytest.fixture(scope="module")
+def robust():
+    return searched(crossing(robust=True), 0, 20_000)
+
+
+def test_robust_paths_cost_little_more_and_replan_cheaply(robust):
+    nominal = searched(crossing(), 0, 20_000)
     assert nominal.cost == nominal.best.cost
     judge = robust.value(nominal.best)
     assert judge == pytest.approx(replanned_plainly(robust.query, nominal.best), rel=1e-9)
@@ -282,10 +293,9 @@ def test_robust_paths_cost_little_more_and_replan_cheaply():
     check_way(robust.query, robust.best)
 
 
-def test_an_attempt_at_a_switch_pose_that_touches_is_lost():
+def test_an_attempt_at_a_switch_pose_that_touches_is_lost(robust):
     """A block that leaves no room for the sixteen displacements of the switch pose: half of them or more are lost."""
-    query = crossing(robust=True)
-    path = searched(query, 0, 20_000).best
+    query, path = robust.query, robust.best
     body, pose = (
         query.bodies[path.pushes[1]],
         path.poses[next(i for i in range(len(path.pieces)) if path.pieces[i][0] != path.pushes[0])],
