@@ -229,6 +229,21 @@ def test_a_picture_holds_the_motion_and_the_words_of_the_plan(planner, document)
     assert saved({"what": "figure"}, plan)["text"].startswith("<svg")
 
 
+def test_a_picture_shows_slides_by_the_path_of_the_centre(document):
+    """A brick without friction at the finger: no push steers it, and it is brought to its goal by slides."""
+    document["object"] = {"outline": [[-30, -20], [30, -20], [30, 20], [-30, 20]], "friction": 0}
+    document |= {"start": [70, 30, 50], "pushes": "auto"}
+    document["pusher"]["fingers"] = 1
+    *_, (plan, options) = LivePlanner().answers(document)
+    assert plan.slides
+    shown = json.loads(json.dumps(picture(plan, options), allow_nan=False))
+    for trace, segment in zip(shown["traces"], plan.on_table, strict=True):
+        assert trace["slides"]
+        np.testing.assert_allclose(trace["flat"], 1e3 * segment.object[:, :2], atol=0.01)  # about its middle
+    with pytest.raises(InputError, match="no push to follow"):
+        Followed(plan, CAMERA)
+
+
 def test_of_the_requests_of_a_client_the_newest_wins(document):
     """Everything is asked for before the worker begins; of each client it answers the last alone."""
     here, there = Pipe()

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..geometry import transform
 from ..geometry.pose import Array
 from ..planning.options import PushOption
-from ..problem import Certificate, Plan
+from ..problem import Certificate, Plan, Scene, SlideSegment
 from ..view import palette, words
 from ..view.page import plan_data
 from ..view.table import MM
@@ -33,7 +34,7 @@ def picture(plan: Plan, options: Sequence[PushOption] = ()) -> dict[str, object]
         "cost": words.cost_text(plan),
         "duration": plan.duration,
         "motion": plan_data(plan, traces),
-        "traces": [_trace(trace) for trace in traces],
+        "traces": [_trace(trace, plan.scene) for trace in traces],
         "goal": _mm(plan.goal_pose * [MM, MM, 1.0], 3),
         "proved": [] if certificate is None or math.isnan(certificate.goal_error[0]) else proved(certificate),
         "warnings": [] if certificate is None else list(certificate.warnings),
@@ -79,14 +80,19 @@ def vocabulary() -> dict[str, object]:
     }
 
 
-def _trace(trace: PushTrace) -> dict[str, object]:
+def _trace(trace: PushTrace, scene: Scene) -> dict[str, object]:
+    """A push, or a slide with the path of the centre of friction instead of that of the flat point."""
+    slides, way = isinstance(trace.segment, SlideSegment), trace.flat_path
+    if slides:
+        way = transform(trace.segment.object, scene.object.cof)
     return {
         "name": trace.segment.push,
         "label": words.push_label(trace.number, trace.segment, True),
         "word": words.word_of(trace.segment),
         "ghosts": _mm(trace.marks * [MM, MM, 1.0], 4),
         "tips": _mm(MM * fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2), 2),
-        "flat": None if trace.flat_path is None else _mm(MM * trace.flat_path, 2),
+        "flat": None if way is None else _mm(MM * way, 2),
+        "slides": slides,
     }
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from .. import compiling
 from ..errors import FlatpushError, InputError
-from ..problem import Plan
+from ..problem import Plan, PushSegment
 
 if TYPE_CHECKING:
     from .feedback import Followed
@@ -241,9 +241,9 @@ class _Worker:
         if not isinstance(push, str):
             raise InputError("the name of a push is needed", key="push", value=push)
         refuse_files(scene)
-        pushes = self._plan[client].pushes if client in self._plan else ()
-        known = number < len(pushes) and pushes[number].push == push
-        arcs = pushes[number].arcs if known else ()
+        moves = self._plan[client].on_table if client in self._plan else ()
+        chosen = moves[number] if number < len(moves) else None
+        arcs = chosen.arcs if isinstance(chosen, PushSegment) and chosen.push == push else ()
         return {**mechanics(self._planner.listed(scene), push, arcs), "segment": number}
 
     def _tell_compiling(self, work: compiling.Work) -> None:

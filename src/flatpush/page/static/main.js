@@ -15,7 +15,7 @@ const model = new Model(), table = new Table(model), player = new Player(model),
 const connection = new Connection(new URLSearchParams(location.search).get("token") || "");
 const hand = table.hand = new Hand(model, table, connection);
 const mechanics = new Mechanics(model, table, connection, player);
-const run = new Run(model, player), feedback = table.feedback = new Feedback(model, connection, player, run), many = new ManyRuns(model, connection), recordings = new Recordings(model, run);
+const run = table.run = new Run(model, player), feedback = table.feedback = new Feedback(model, connection, player, run), many = new ManyRuns(model, connection), recordings = new Recordings(model, run);
 feedback.changed = () => { player.paused = feedback.on ? () => feedback.pause() : null; show(); };
 player.moved = () => mechanics.follow();
 const state = { run, feedback, many, recordings, mechanics, latencies: table.latencies, hand, model, table, player, connection, busy: false, answered: 0 };

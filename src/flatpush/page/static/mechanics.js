@@ -21,7 +21,7 @@ export class Mechanics {
   get name() {
     const { selected, plan } = this.model;
     const trace = selected.startsWith("push:") && plan && plan.traces ? plan.traces[Number(selected.split(":")[1])] : null;
-    return trace ? trace.name : "";
+    return trace && !trace.slides ? trace.name : "";
   }
 
   ask() { if (this.name) this.connection.send("mechanics", { scene: this.model.scene, push: this.name, segment: this.number }); }

@@ -153,5 +153,5 @@ function describe(segment, turn, height) {
   if (!segment) return "at rest";
   if (segment.text) return segment.text;
   if (segment.push === null) return height > 1e-3 ? "pusher lifted " + number(height, 0) + " mm" : "pusher alone, on the table";
-  return "push " + segment.number + " “" + segment.push + "”, " + (turn.turn === "straight" ? "straight" : "turning " + turn.turn);
+  return "push " + segment.number + " “" + segment.push + "”, " + (!turn ? "sliding" : turn.turn === "straight" ? "straight" : "turning " + turn.turn);
 }

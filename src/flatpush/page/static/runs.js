@@ -124,7 +124,7 @@ export class Feedback {
     const { seen } = answer, ghost = find("seen");
     ghost.style.display = seen ? "" : "none";
     if (seen) set(ghost, { d: path(corners(this.model.scene.object.outline).map((p) => place(seen, p))) });
-    const landed = answer.landings > 1 ? `, landing ${answer.landings}` : "";
+    const landed = answer.landings < 2 ? "" : answer.outcome ? `, with ${answer.landings} landings` : `, landing ${answer.landings}`;
     this.tell(answer.outcome ? `${answer.outcome[0].toUpperCase()}${answer.outcome.slice(1)} after ${number(live.times[live.times.length - 1], 1)} s${landed}.` : `${text}${landed}`);
     this.moves = answer.landings;
     if (answer.outcome) this.stop();

@@ -55,6 +55,8 @@ export class Table {
       if (trace.flat) lines.push(trace.flat);
       for (const ghost of trace.ghosts) lines.push(outline.map((p) => place(ghost, p)));
     }
+    const way = this.run.motion ? this.run.motion.object : [];
+    way.filter((_, k) => k % 30 === 0).concat(way.slice(-1)).forEach((pose) => lines.push(outline.map((p) => place(pose, p))));
     const [x0, y0, x1, y1] = box(lines), margin = 0.1 * size(outline);
     this.view = {
       x: (x0 + x1) / 2, y: (y0 + y1) / 2,
@@ -185,7 +187,7 @@ export class Table {
       const node = svg("g", { class: "push" + (selected === `push:${k}` ? " chosen" : ""), style: `--c:${trace.colour}` });
       for (const [x, y, angle] of trace.ghosts) node.append(svg("path", { class: "ghost", d: shape, transform: `translate(${x} ${y}) rotate(${angle / RAD})` }));
       if (trace.tips.length) node.append(svg("path", { class: "trail", d: trace.tips.map(([x, y]) => `M${x - tip} ${y}a${tip} ${tip} 0 1 0 ${2 * tip} 0a${tip} ${tip} 0 1 0 ${-2 * tip} 0`).join("") }));
-      if (trace.flat) node.append(svg("path", { class: "flat", d: path(trace.flat, false) }));
+      if (trace.flat) node.append(svg("path", { class: trace.slides ? "flat slide" : "flat", d: path(trace.flat, false) }));
       parts.push(node);
     });
     traces.forEach((trace, k) => {
