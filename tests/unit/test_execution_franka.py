@@ -86,6 +86,31 @@ def test_a_velocity_that_is_not_renewed_ends_after_a_tenth_of_a_second():
 
 
 @pytest.mark.slow
+def test_a_robot_that_freezes_ends_the_run_and_does_not_go_on_afterwards():
+    """Its time stands still as well: once it goes on, it stops within a tenth of a second of its own time."""
+    with Controller() as controller, robot_at(controller.host, silence=2.0) as robot:
+        count = 0
+
+        def told(cycle):
+            nonlocal count
+            count += 1
+            if count == 30:
+                controller.process.send_signal(signal.SIGSTOP)
+
+        ended = swing(robot, 120, told, width=0.05)
+        assert ended.outcome != DONE
+        assert 30 <= len(ended.cycles) <= 41
+        robot.stop()
+        last = ended.cycles[-1].state
+        assert np.hypot(*last.twist[:2]) > 0.02  # it was under way
+        controller.process.send_signal(signal.SIGCONT)
+        moved = np.array([controller.asked()["q"] for _ in range(500)]) - ARM.joints(last.pose)
+        # Each answer is a step of the robot or more, of 1 ms. It comes to rest near where it was.
+        assert np.abs(moved).max() < 0.02
+        assert np.ptp(moved[-100:], axis=0).max() < 1e-3
+
+
+@pytest.mark.slow
 def test_a_turned_elbow_is_no_start():
     joints = ARM.joints(HOME)
     joints[2] = 0.1
@@ -99,8 +124,11 @@ def test_it_conforms():
 
 
 @pytest.mark.slow
-def test_the_same_plan_ends_at_the_same_place_on_all_arms(triangle):
+def test_the_same_plan_ends_at_the_same_place_on_all_robots(triangle, tmp_path):
     """On the network the FR3 has no object: the way that its tool really made pushes the one of the physics cell."""
+    pytest.importorskip("abb_robot_client")
+    from tests.unit.test_execution_egm import Controller as EgmController
+
     pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
     pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
     plan = fp.plan(fp.Scene(triangle, (-0.01, -0.06, 0.1), pusher=pusher, pushes=pushes))
@@ -114,15 +142,22 @@ def test_the_same_plan_ends_at_the_same_place_on_all_arms(triangle):
     assert np.mean(off) < 1e-4
     assert np.max(off) < 3e-4
     found = {}
+    plan.save(tmp_path / "plan.json")
+    with EgmController("--plan", tmp_path / "plan.json") as controller:
+        address = f"egm://127.0.0.1:{controller.port}?silence={SILENCE}&connect={SILENCE}"
+        with open_robot(address, plan) as robot:
+            assert run(plan, robot).outcome == DONE
+            found["egm"] = np.array(controller.asked()["object"])
     with CellRobot(plan) as cell:
         for cycle in ended.cycles:
             cell.send(Target(cell.clock.now() + 0.01, cycle.state.pose, cycle.state.twist))
             cell.clock.wait(cell.clock.now() + 0.01)
         found["network"] = cell.object
-    for name in ("fr3", "irb120"):
+    for name in ("tool", "fr3", "irb120"):
         with open_robot(f"mujoco://{name}", plan, base) as cell:
             run(plan, cell)
             found[name] = cell.object
+    assert np.hypot(*(found["tool"] - plan.scene.start_pose)[:2]) > 0.04
     for one, other in itertools.combinations(found.values(), 2):
         assert np.hypot(*(one - other)[:2]) < 0.0005
         assert abs(one[2] - other[2]) < math.radians(0.3)
