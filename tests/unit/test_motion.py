@@ -244,6 +244,51 @@ def test_from_a_log_with_names_of_its_own_to_a_scene(tmp_path, scene, run):
     assert after.start == pytest.approx(before.start)
 
 
+def test_a_scene_gives_names_and_units_of_its_recordings_once(tmp_path, scene, run):
+    from flatpush.documents.motion_file import columns_of_scene, load_motions
+
+    motions = pushed(pushes=PUSHES[:2])
+    log = written(motions, tmp_path / "log.csv", "stamp,ox,oy,yaw,tip_x,tip_y,try")
+    assert columns_of_scene(scene) is None
+    names = "{t: stamp, x: ox, y: oy, theta: yaw, px: tip_x, py: tip_y, push: try}"
+    scene.write_text(SCENE + f"logs: {{columns: {names}, length: mm, angle: deg}}\n")
+    columns, length, angle = columns_of_scene(scene)
+    read = load_motions(log, columns=columns, length=length, angle=angle).motions
+    assert [len(m.times) for m in read] == [len(m.times) for m in motions]
+    assert np.allclose(read[0].poses, motions[0].poses, atol=1e-6)
+    assert np.allclose(read[1].tips, motions[1].tips, atol=1e-6)
+    assert fp.load_scene(scene).object.friction == 0.4
+    # The command takes them from there: with another name its message has that.
+    scene.write_text(scene.read_text().replace("tip_x,", "gx,"))
+    assert "line 1 names no column gx" in run(log, "--scene", scene)[2]
+    scene.write_text(scene.read_text().replace("{t: stamp", "{time: stamp"))
+    assert "logs.columns.time" in run(log, "--scene", scene)[2]
+
+
+def test_a_run_under_feedback_is_logged_as_a_robots(tmp_path):
+    from flatpush.control import ClosedLoopRun
+    from flatpush.documents import load_robot_log
+    from flatpush.documents.motion_file import load_motions
+    from flatpush.execution.log import save_followed
+
+    times = np.arange(8) / 25
+    poses, hands = (
+        np.column_stack([0.1 + 0.05 * times, 0 * times, times]),
+        np.column_stack([0.07 + 0.05 * times, 0 * times, 0 * times]),
+    )
+    heights = np.array([0.0, 0.0, 0.01, 0.01, 0.0, 0.0, 0.0, 0.0])  # at the ends of the ticks
+    words = ("sticking",) * 8
+    run = ClosedLoopRun(times, poses, hands, heights, words, words, "arrived")
+    save_followed(run, "block", tmp_path / "run.csv")
+    (one,) = load_robot_log(tmp_path / "run.csv").runs
+    assert one.actions.tolist() == [1, 1, 1, 2, 2, 2]
+    assert one.times.tolist() == pytest.approx(times[[0, 1, 2, 5, 6, 7]].tolist())
+    assert np.allclose(one.hands, hands[[0, 1, 2, 5, 6, 7]], atol=1e-8)
+    assert load_motions(tmp_path / "run.csv").motions[0].poses[1].tolist() == pytest.approx(poses[1].tolist())
+    with pytest.raises(fp.InputError, match=r"ends in \.csv"):
+        save_followed(run, "block", tmp_path / "run.mcap")
+
+
 def test_the_log_of_a_run_and_its_bag_hold_the_same_motion(tmp_path):
     from types import SimpleNamespace
 

@@ -52,11 +52,13 @@ def command(
     ] = None,
     pool: Annotated[bool, typer.Option("--pool", help="One surface for all experiments together.")] = False,
     units: Annotated[
-        str,
+        str | None,
         typer.Option(
-            metavar="UNITS", help="Units of columns that do not name them: m, cm or mm, and rad or deg."
+            metavar="UNITS",
+            help="Units of columns that do not name them: m, cm or mm, and rad or deg; by default the scene's logs, or"
+            " m,rad.",
         ),
-    ] = "m,rad",
+    ] = None,
     length: Annotated[
         float | None,
         typer.Option(
@@ -108,14 +110,14 @@ def command(
             raise InputError("--figure draws surfaces from wrenches, not from motion")
         from .identify_motion import Asked, identify_motion
 
-        return identify_motion(Asked(data, scene, output, units, columns, skip_bad, suggests, as_json))
+        return identify_motion(Asked(data, scene, output, units or "", columns, skip_bad, suggests, as_json))
     if columns or suggests:
         raise InputError("--columns and --suggest are for recordings of motion (t,x,y,theta,px,py)")
     if figure is not None:
         from ..view.picture import check_ending
 
         check_ending(figure)
-    experiments, notes = _read(data, units, skip_bad, pool)
+    experiments, notes = _read(data, units or "m,rad", skip_bad, pool)
     if len(experiments) > 1 and output is not None:
         raise InputError(
             "a surface is written for one experiment",

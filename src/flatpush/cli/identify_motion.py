@@ -34,14 +34,18 @@ class Asked:
 def identify_motion(asked: Asked) -> int:
     """Fits, prints, writes the scene."""
     from ..documents import load_motions, load_scene, own_columns, save_fitted_scene
+    from ..documents.motion_file import columns_of_scene
     from ..identification import fit_motion, radii, suggest, summarise
     from ..planning.candidates import automatic_pushes
 
     if asked.output is not None and asked.output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError("the fitted scene is a YAML file", source=str(asked.output), hint="-o fitted.yaml")
-    length, angle = units_of(asked.units)
+    length, angle = units_of(asked.units or "m,rad")
     columns = own_columns(asked.columns) if asked.columns else None
     scene = load_scene(asked.scene, unknown=True)
+    if (given := columns_of_scene(asked.scene)) is not None:
+        columns = columns or given[0]
+        length, angle = (length, angle) if asked.units else given[1:]
     motions: list[Motion] = []
     for path in asked.data:
         file = load_motions(path, columns=columns, length=length, angle=angle, skip_bad=asked.skip_bad)

@@ -91,6 +91,12 @@ def command(
     seed: Annotated[
         int, typer.Option(metavar="N", help="Seed of the noise; the same seed gives the same run.")
     ] = 0,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the run as .csv, which identify, calibrate and replay read."
+        ),
+    ] = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run as .svg or .png.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
@@ -132,6 +138,10 @@ def command(
         seed,
         None if within is None else (within[0] / 1000, math.radians(within[1])),
     )
+    if log is not None:
+        check_outputs([plan, table], [log, figure])
+        if log.suffix.lower() != ".csv":
+            raise InputError("the log of a simulated run ends in .csv", source=str(log))
     if (scene := _unknown(plan)) is not None:
         if not learn:
             raise InputError(
@@ -140,7 +150,7 @@ def command(
             )  # fmt: skip
         if figure is not None:
             raise InputError("--figure draws a run beside its plan, and here is none", value=str(figure))
-        return _learned(tracked, scene, table, as_json)
+        return _learned(tracked, scene, table, log, as_json)
     if table is not None:
         raise InputError("--table goes with a scene whose support is unknown", value=str(table))
     loaded = load_plan(plan)
@@ -154,6 +164,10 @@ def command(
     run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")
+    if log is not None:
+        from ..execution.log import save_followed
+
+        save_followed(run, loaded.scene.object.name, log)
     distance, turn = goal_error(loaded, run.object[-1])
     how = "slides" if loaded.slides else controller
     result = {
@@ -200,11 +214,12 @@ def _unknown(path: Path) -> Scene | None:
     return scene
 
 
-def _learned(tracked: TrackedRun, scene: Scene, table: Path | None, as_json: bool) -> int:
+def _learned(tracked: TrackedRun, scene: Scene, table: Path | None, log: Path | None, as_json: bool) -> int:
     """First pushes that teach, and then to the goal."""
     from ..control import ARRIVED
     from ..control.tracking.unknown_table import drawn_table, run_unknown, same_outline
     from ..documents import load_scene
+    from ..execution.log import save_followed
 
     if table is None:
         thing = drawn_table(scene.object.outline, tracked.seed)
@@ -217,6 +232,8 @@ def _learned(tracked: TrackedRun, scene: Scene, table: Path | None, as_json: boo
     done = run_unknown(
         scene, thing, tracked.camera, seed=tracked.seed, rate=tracked.rate, tolerance=tracked.tolerance
     )
+    if log is not None:
+        save_followed(done.run, scene.object.name, log)
     run, error = done.run, scene.goal_error(done.run.object[-1])
     distance, turn = math.hypot(error[0], error[1]), abs(float(error[2]))
     learned = None

@@ -13,7 +13,7 @@ from ..errors import InputError, MissingExtra
 from ..geometry.pose import Array, wrap_angle
 from .context import PER_METRE
 from .pairs_file import HEADER, csv_lines
-from .reading import read_text
+from .reading import read_mapping, read_text
 from .robot_log import RAW, load_robot_log
 from .rows import BadRow, Unusable, number, refusal
 
@@ -95,7 +95,10 @@ def load_motions(
     if not columns and (RAW[1] in names or _is_number(names[0])):
         return _from_robot(source, skip_bad)
     places, factors = _places(names, columns or {}, length, angle, source)
-    group = names.index(GROUP) if GROUP in names else None
+    parted = (columns or {}).get(GROUP, GROUP)
+    if parted != GROUP and parted not in names:
+        raise InputError(f"line 1 names no column {parted}", source=source, value=",".join(names))
+    group = names.index(parted) if parted in names else None
     rows: dict[str, list[tuple[int, list[float]]]] = {}
     bad: list[BadRow] = []
     for line, cells in lines:
@@ -156,6 +159,27 @@ def own_columns(text: str) -> dict[str, str]:
             )
         found[role] = name
     return found
+
+
+def columns_of_scene(scene: str | os.PathLike[str]) -> tuple[dict[str, str], str, str] | None:
+    """Names of columns, and units of length and angle, that a scene file gives for recordings of its object; None if it
+    gives none.
+
+    Raises:
+        InputError: for a role that there is not.
+    """
+    logs = read_mapping(scene).get("logs")
+    if not isinstance(logs, dict):
+        return None
+    columns = dict(logs.get("columns") or {})
+    for role in columns:
+        if role not in (*ROLES, GROUP):
+            raise InputError(
+                f"columns have the roles {', '.join((*ROLES, GROUP))}",
+                source=os.fspath(scene),
+                key=f"logs.columns.{role}",
+            )
+    return columns, str(logs.get("length", "m")), str(logs.get("angle", "rad"))
 
 
 def _is_number(text: str) -> bool:

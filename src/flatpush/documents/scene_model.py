@@ -384,6 +384,19 @@ class PlanningPart(Part):
     time_limit: Positive = Field(default=5.0, description="Seconds.")
 
 
+class LogsPart(Part):
+    """How recordings of this object are written, which `flatpush identify` reads."""
+
+    columns: dict[Text, Text] = Field(
+        default_factory=dict,
+        description="The recordings' own names of columns, {x: obj_x, theta: yaw}; a unit may follow in brackets.",
+    )
+    length: Literal["m", "cm", "mm"] = Field(
+        default="m", description="Of columns without a unit: m, cm or mm."
+    )
+    angle: Literal["rad", "deg"] = Field(default="rad", description="Of columns without a unit: rad or deg.")
+
+
 class SceneModel(Part):
     """A scene: what is pushed, by what, from where to where."""
 
@@ -405,3 +418,6 @@ class SceneModel(Part):
         description="{bounds: [xmin, ymin, xmax, ymax], obstacles: [...]}.",
     )
     planning: PlanningPart = Field(default_factory=PlanningPart, description="How to plan.")
+    logs: LogsPart | None = Field(
+        default=None, description="{columns: {x: obj_x, theta: yaw}, length: mm, angle: deg}."
+    )
