@@ -13,6 +13,7 @@ from ..errors import FlatpushError
 from . import (
     calibrate,
     camera,
+    demonstrate,
     describe,
     experiment,
     export,
@@ -50,6 +51,7 @@ app.command("replay")(replay.command)
 app.add_typer(camera.app)
 app.command("init")(init.command)
 app.command("view")(view.command)
+app.command("demonstrate")(demonstrate.command)
 app.command("experiment")(experiment.command)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.pose import Array
@@ -40,7 +41,11 @@ class PushPolicy:
         self._rest: tuple[SlidePush, ...] = ()
         self.plans = 0
 
-    def act(self, state: Array) -> Array:
+    def look(self) -> None:
+        """Drops the push that it is making: the object is somewhere else."""
+        self._places = []
+
+    def act(self, state: ArrayLike) -> Array:
         """The action (2,) in a state."""
         x, y, sine, cosine, *others = np.asarray(state, dtype=float).tolist()
         seen, tip = np.array([x, y, np.arctan2(sine, cosine)]), np.array(others[:2])

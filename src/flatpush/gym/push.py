@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..geometry.pose import Array
@@ -90,10 +90,15 @@ class PushEnv(gymnasium.Env[Observation, Array]):
         self._many.begin(0, options or {})
         return self._many.observed()[0], self._info()
 
-    def step(self, action: Array) -> tuple[Observation, float, bool, bool, Info]:
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, Info]:
         """One decision."""
         reward, ended, cut = self._many.advance(np.asarray(action, dtype=float)[None])
         return self._many.observed()[0], float(reward[0]), bool(ended[0]), bool(cut[0]), self._info()
+
+    def displace(self, displacement: Array) -> Observation:
+        """Moves the object by (x, y, θ), shape (3,) [m, m, rad], as by a knock; what is seen then."""
+        self._many.knock(0, displacement)
+        return self._many.observed()[0]
 
     def render(self) -> NDArray[np.uint8] | None:
         """The table from above, (96, 96, 3)."""
@@ -217,6 +222,12 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
         self._see()
         ended = solved | self._stopped | self._collision
         return reward, ended, (self._steps >= task.longest) & ~ended
+
+    def knock(self, k: int, displacement: Array) -> None:
+        """Moves the object of one environment by (x, y, θ), shape (3,) [m, m, rad]."""
+        self.object[k] += displacement
+        self._frames[k] = self._seen(self.object[k], self.rngs[k])
+        self._far[k] = self.task.farthest(self.object[k], self.goal[k])
 
     def told(self) -> dict[str, Array]:
         """Of each: pose of the object as it is, its error (m, rad), success, collision, stop."""

@@ -1,0 +1,177 @@
+"""Demonstrations: each is replayed, the data set is read by the layout's own rules, and breaks leave it readable."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.documents import parse_scene
+from flatpush.errors import InputError
+
+pytest.importorskip("gymnasium", reason="gymnasium is in the extra `demonstrations`")
+parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is in the extra `demonstrations`")
+
+from flatpush.gym import Eyes, PushTask, demonstrations, lerobot  # noqa: E402  # after what they need
+from flatpush.gym.demonstrations import Block, Episode  # noqa: E402
+from flatpush.gym.push import PushEnv  # noqa: E402
+
+BRICK = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
+SCENE = fp.Scene(fp.Object(BRICK, friction=0.0), (0.07, 0.03, 0.9))
+
+
+def made_up(lengths, rng) -> Block:
+    """A block of episodes of random numbers."""
+    episodes = tuple(
+        Episode(int(rng.integers(1000)), 0, rng.normal(size=(n, 10)), rng.normal(size=(n, 2)), rng.normal(size=n), -1,
+                np.zeros(3))
+        for n in lengths
+    )  # fmt: skip
+    return Block(SCENE, episodes, len(episodes))
+
+
+def read(folder):
+    """Information, frames and episodes, as a reader of the layout finds them: by the paths of info.json alone."""
+    info = json.loads((folder / "meta" / "info.json").read_text())
+    frames, episodes, seen = {}, [], set()
+    listed = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
+    for row in (row for path in listed for row in parquet.read_table(path).to_pylist()):
+        if row["episode_index"] >= info["total_episodes"]:
+            continue
+        place = {key: row[f"data/{key}"] for key in ("chunk_index", "file_index")}
+        path = folder / info["data_path"].format(**place)
+        if path not in seen:
+            seen.add(path)
+            frames |= {frame["index"]: frame for frame in parquet.read_table(path).to_pylist()}
+        episodes.append(row)
+    return info, frames, sorted(episodes, key=lambda row: row["episode_index"])
+
+
+def check(folder):
+    """The rules of the layout: indices run on, times follow the rate, episodes and statistics are of their frames."""
+    info, frames, episodes = read(folder)
+    assert info["codebase_version"] == "v3.0"
+    assert [e["episode_index"] for e in episodes] == list(range(info["total_episodes"]))
+    start = 0
+    for row in episodes:
+        assert row["dataset_from_index"] == start
+        start = row["dataset_to_index"]
+        own = [frames[k] for k in range(row["dataset_from_index"], start)]
+        assert len(own) == row["length"]
+        assert [f["frame_index"] for f in own] == list(range(row["length"]))
+        assert {f["episode_index"] for f in own} == {row["episode_index"]}
+        assert np.allclose([f["timestamp"] for f in own], np.arange(len(own)) / info["fps"], atol=1e-4)
+        assert [f["next.done"] for f in own] == [False] * (len(own) - 1) + [True]
+        states = np.array([f["observation.state"] for f in own])
+        assert np.allclose(row["stats/observation.state/mean"], states.mean(axis=0), atol=1e-5)
+        for name, told in info["features"].items():
+            value = own[0][name]
+            assert len(value) == told["shape"][0] if isinstance(value, list) else told["shape"] == [1]
+    assert start == info["total_frames"]
+    whole = np.array([frames[k]["action"] for k in range(start)])
+    stats = json.loads((folder / "meta" / "stats.json").read_text())["action"]
+    for name, value in (
+        ("min", whole.min(0)),
+        ("max", whole.max(0)),
+        ("mean", whole.mean(0)),
+        ("std", whole.std(0)),
+    ):
+        assert np.allclose(stats[name], value, atol=1e-5)
+    tasks = parquet.read_table(folder / "meta" / "tasks.parquet").to_pylist()
+    assert [t["task_index"] for t in tasks] == [0]
+    return info, frames, episodes
+
+
+def test_blocks_become_a_data_set_and_it_goes_on(tmp_path):
+    rng = np.random.default_rng(0)
+    first = lerobot.LeRobotFolder(tmp_path / "set", 5)
+    first.add(made_up([3, 7, 4], rng), 10)
+    first.add(made_up([], rng), 10)
+    later = lerobot.LeRobotFolder(tmp_path / "set", 5)
+    assert (later.episodes, later.frames, later.blocks) == (3, 14, 2)
+    block = made_up([5, 6, 2], rng)
+    later.add(block, 2)
+    info, frames, episodes = check(tmp_path / "set")
+    assert info["total_episodes"] == 5
+    assert info["total_frames"] == 25
+    own = [frames[k]["observation.state"] for k in range(14, 19)]
+    assert np.allclose(own, block.episodes[0].states, atol=1e-6)
+    assert episodes[3]["flatpush/seed"] == block.episodes[0].seed
+
+
+@pytest.mark.parametrize("breaks_at", [0, 1, 2, 3, 4, 5])
+def test_a_full_disk_leaves_what_is_complete(tmp_path, monkeypatch, breaks_at):
+    """Whichever file of the second block cannot be written, the first is read as before, and a new run goes on."""
+    rng = np.random.default_rng(1)
+    folder = lerobot.LeRobotFolder(tmp_path / "set", 0)
+    folder.add(made_up([4, 5], rng), 10)
+    whole, count = lerobot.write_atomically, iter(range(100))
+
+    def full(path, data):
+        if next(count) == breaks_at:
+            raise InputError("no space left on device", source=str(path))
+        whole(path, data)
+
+    monkeypatch.setattr(lerobot, "write_atomically", full)
+    with pytest.raises(InputError, match="no space"):
+        folder.add(made_up([6], rng), 10)
+    monkeypatch.setattr(lerobot, "write_atomically", whole)
+    info, frames, episodes = read(tmp_path / "set")
+    assert info["total_episodes"] == 2
+    assert [e["length"] for e in episodes] == [4, 5]
+    assert all(k in frames for k in range(9))
+    again = lerobot.LeRobotFolder(tmp_path / "set", 0)
+    again.add(made_up([2, 3], rng), 10)
+    assert check(tmp_path / "set")[0]["total_episodes"] == 4
+
+
+def test_what_is_no_data_set_of_ours_is_left_alone(tmp_path):
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(InputError, match="something else"):
+        lerobot.LeRobotFolder(tmp_path, 0)
+    folder = lerobot.LeRobotFolder(tmp_path / "set", 0)
+    folder.add(made_up([2], np.random.default_rng(0)), 1)
+    with pytest.raises(InputError, match="another seed"):
+        lerobot.LeRobotFolder(tmp_path / "set", 1)
+    (tmp_path / "set" / "meta" / "info.json").write_text("{}")
+    with pytest.raises(InputError, match="no data set that flatpush wrote"):
+        lerobot.LeRobotFolder(tmp_path / "set", 0)
+    with pytest.raises(InputError, match="one finger"):
+        demonstrations.check_scenes([replace(SCENE, pusher=fp.Pusher(fingers=2, spacing=0.018))])
+
+
+def test_a_replay_notices_another_action_and_another_end():
+    env = PushEnv(PushTask(SCENE, random=False))
+    options = {"seed": 3}
+    states, actions = [env.reset(**options)[0]], [np.array([0.5, 0.5], np.float32)] * 3
+    for action in actions:
+        state, reward, *_ = env.step(action)
+        states.append(state)
+    whole = Episode(3, 0, np.array(states[:3]), np.array(actions), np.full(3, reward), -1, np.zeros(3))
+    assert not demonstrations.replays(env, whole)  # it leads nowhere
+    other = replace(whole, actions=whole.actions * np.float32(0.9))
+    assert not demonstrations.replays(env, other)
+
+
+@pytest.mark.slow
+def test_demonstrations_reach_their_goals_also_after_a_knock(tmp_path, monkeypatch):
+    """Read back from the data set alone: scene, seed and knock of each, and its actions lead to the goal once more."""
+    monkeypatch.setattr(demonstrations, "BLOCK", 4)
+    monkeypatch.setattr(demonstrations, "DISTURBED", 1.0)
+    block = demonstrations.demonstrated(SCENE, 2, 0)
+    assert len(block.episodes) >= 3
+    lerobot.LeRobotFolder(tmp_path / "set", 2).add(block, 10)
+    _, frames, episodes = check(tmp_path / "set")
+    assert any(e["flatpush/disturbed"] >= 0 for e in episodes)
+    told = json.loads((tmp_path / "set" / "meta" / "flatpush" / "scene-00000.json").read_text())
+    task = PushTask(parse_scene(told), noise=fp.Noise(0.0, 0.0, 0.1), eyes=Eyes(2e-4, 3e-3))
+    env = PushEnv(task)
+    for row in episodes:
+        env.reset(seed=row["flatpush/seed"])
+        for k, index in enumerate(range(row["dataset_from_index"], row["dataset_to_index"])):
+            if k == row["flatpush/disturbed"]:
+                env.displace(np.array(row["flatpush/displacement"]))
+            *_, ended, _, info = env.step(np.array(frames[index]["action"], np.float32))
+        assert ended
+        assert info["is_success"]
