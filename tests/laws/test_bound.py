@@ -92,6 +92,7 @@ def test_jumps_of_the_length_are_inside_the_bounds():
         assert box_bound(cars, chains, 0, point, half, np.inf) < radius * turn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["dubins", "cone"])
 def test_no_plan_of_a_search_is_below_the_bound_which_comes_near(kind):
     rng = np.random.default_rng(11)
@@ -133,6 +134,7 @@ def test_bounds_rise_and_end_where_nothing_is_left():
     assert last.least_of_all == last.least[1]
 
 
+@pytest.mark.slow
 def test_a_goal_that_leaves_room_costs_less():
     rng = np.random.default_rng(9)
     fleet, start = random_fleet(rng, "dubins", 2), np.array([0.1, 0.05, 1.0])

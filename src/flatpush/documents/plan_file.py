@@ -213,6 +213,7 @@ def _read_certificate(part: CertificatePart | NoCertificatePart) -> Certificate 
     values = part.model_dump()
     others = {key: values.pop(key) for key in list(values) if key not in CertificatePart.model_fields}
     values["goal_error"] = tuple(values["goal_error"])
+    values["set_end"] = None if values.get("set_end") is None else tuple(values["set_end"])
     values["warnings"] = tuple(values["warnings"])
     values["cars"] = {
         name: CarCentres(**{key: tuple(pair) for key, pair in car.items()})

@@ -114,7 +114,7 @@ class CertificatePart(BaseModel):
     set_loads: Finite | None = Field(
         default=None, description="The largest share by which loads may differ so that the plan still holds."
     )
-    set_end: tuple[Finite, Finite] | None = Field(
+    set_end: Vector2 | None = Field(
         default=None, description="Half the sides of the box about the planned end that the object ends in."
     )
     set_clearance: Finite | None = Field(
