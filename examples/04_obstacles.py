@@ -13,9 +13,9 @@ scene = replace(scene, planning=replace(scene.planning, iterations=300, time_lim
 
 planner = fp.Planner(scene)
 for answer in planner.answers():
-    names = " – ".join(push.push for push in answer.plan.pushes)
-    print(f"{1000 * answer.plan.cost:.0f} mm: {names}")
-plan = answer.plan
+    print(f"{1000 * answer.cost:.0f} mm")
+plan = answer.plan()  # made, with its certificate, when it is asked for
+print(" – ".join(push.push for push in plan.pushes))
 
 certificate = plan.certificate
 print(f"clearance {1000 * certificate.clearance:.2f} mm, asked for {1000 * scene.planning.clearance:.2f} mm")
