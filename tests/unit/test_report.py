@@ -104,3 +104,17 @@ def test_what_all_refuses(words, told, tmp_path, monkeypatch, capsys):
     assert ended.value.code == 2
     assert told in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_a_cluster_finds_what_this_process_does_and_tells_when():
+    """The answers stand in the order of the jobs, whichever comes first."""
+    pytest.importorskip("distributed", reason="a cluster needs the extra `cluster`")
+    from flatpush.cli.cluster import cluster
+
+    jobs, told = [Job("fig3", quick=True), Job("duality", quick=True)], []
+    with cluster(None) as spread:
+        done = spread(compute, jobs, told.append)
+    assert [one.job for one in done] == jobs
+    assert {one.job.name for one in told} == {"fig3", "duality"}
+    assert [one.finding.rows for one in done] == [compute(job).finding.rows for job in jobs]

@@ -177,7 +177,7 @@ def run(folder: Path | None = None) -> str:
         )
     lines.append(
         "  The paper's 2.55° is a value on the way; position feedback alone does not remove this bias. With the"
-        " estimator: heading against that of the learned axle."
+        " estimator: heading against that of the learned axle; the object itself stays turned by the bias."
     )
     if folder is not None:
         draw(folder / "fig4.svg")
