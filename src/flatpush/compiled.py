@@ -29,7 +29,7 @@ from numba.extending import intrinsic, overload
 
 from . import compiling, kernel_store
 from .formulas import CHOICES, FORMULAS
-from .kernel_pipeline import Direct, Within
+from .kernel_pipeline import Direct, Vectorised, Within
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -51,7 +51,8 @@ def kernel(signature: object = None, *, fused: bool = False, lent: bool = False)
     options = _PLAIN | (_FUSED if fused else {}) | (_LENT if lent else {})
 
     def decorate(function: F) -> F:
-        made = nb.njit(nogil=True, no_cfunc_wrapper=True, pipeline_class=Direct, **options)(function)
+        pipeline = Vectorised if fused else Direct
+        made = nb.njit(nogil=True, no_cfunc_wrapper=True, pipeline_class=pipeline, **options)(function)
         if isinstance(made, Dispatcher):  # NUMBA_DISABLE_JIT leaves functions as they are
             made._cache = _Kept(made)  # type: ignore[attr-defined]
             if signature is not None:

@@ -72,6 +72,12 @@ class Within(Direct):
     lowering = _LowerWithin
 
 
+class Vectorised(Direct):
+    """Compiles a kernel whose loops become vectors, for which numba's own two rounds of optimising do better."""
+
+    lowering = NativeLowering
+
+
 Direct.lowering = _Lower
 
 
