@@ -1,10 +1,13 @@
 """How quickly the live page answers, in headless Chromium: python benchmarks/page.py [MOVES], a minute.
 
 From a pointer's move to the new path on the screen, while start and goal are dragged: among nothing and among ten
-obstacles; and from the start of `flatpush view` to the first plan on the screen, with compiled kernels.
+obstacles; from the start of `flatpush view` to the first plan on the screen, with compiled kernels; and how often the
+object is moved in a second while the pointer pushes it. CPU is that of server and planner together while the pointer
+moves, for each path or step: it does not depend on who else uses the machine.
 """
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -62,8 +65,57 @@ def wait(browser: webdriver.Chrome, condition: str) -> None:
         time.sleep(0.002)
 
 
-def dragged(browser: webdriver.Chrome, thing: str, moves: int) -> list[float]:
-    """Latencies [ms] of a drag at 60 moves a second."""
+def spent(server: subprocess.Popen[str]) -> float:
+    """CPU time of the server and its planner so far [s]."""
+    numbers = [server.pid]
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:  # it has just ended
+            continue
+        if int(fields[1]) == server.pid:
+            numbers.append(int(folder.name))
+    ticks = 0
+    for number in numbers:
+        fields = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
+    """Times from a step that is asked for to the object that has moved [ms], while the pointer pushes it at 60 Hz."""
+    browser.execute_script("document.getElementById('push').click(); flatpush.hand.frames.length = 0;")
+    x, y, _, high = browser.execute_script(
+        "const b = document.querySelector('#hand .body').getBoundingClientRect();"
+        "return [b.x, b.y, b.width, b.height];"
+    )
+
+    def mouse(kind: str, k: int) -> None:
+        event = {
+            "type": kind,
+            "x": x - 20 + 60 * k / moves,
+            "y": y + high / 2,
+            "button": "left",
+            "buttons": 1,
+        }
+        browser.execute_cdp_cmd("Input.dispatchMouseEvent", {**event, "clickCount": 1})
+
+    mouse("mousePressed", 0)
+    began = time.perf_counter()
+    for k in range(1, moves + 1):
+        time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
+        mouse("mouseMoved", k)
+    mouse("mouseReleased", moves)
+    times = [float(v) for v in browser.execute_script("return flatpush.hand.frames")]
+    browser.execute_script("document.getElementById('push').click();")
+    return times
+
+
+def dragged(
+    browser: webdriver.Chrome, server: subprocess.Popen[str], thing: str, moves: int
+) -> tuple[list[float], float]:
+    """Latencies [ms] of a drag at 60 moves a second, and the CPU time that it took [s]."""
+    cpu = spent(server)
     x, y = browser.execute_script(
         "const b = document.querySelector(arguments[0]).getBoundingClientRect();"
         "return [b.x + b.width / 2, b.y + b.height / 2];",
@@ -88,8 +140,9 @@ def dragged(browser: webdriver.Chrome, thing: str, moves: int) -> list[float]:
         time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
         mouse("mouseMoved", k)
     mouse("mouseReleased", moves)
+    cpu = spent(server) - cpu
     wait(browser, "!flatpush.busy")
-    return [float(v) for v in browser.execute_script("return flatpush.latencies")]
+    return [float(v) for v in browser.execute_script("return flatpush.latencies")], cpu
 
 
 def main() -> None:
@@ -119,11 +172,21 @@ def main() -> None:
                 )
                 wait(browser, "!flatpush.busy")
                 for thing in ("start", "goal"):
-                    times = dragged(browser, thing, moves)
+                    times, cpu = dragged(browser, server, thing, moves)
                     found[f"{name}: {thing} dragged"] = {
                         "paths": len(times),
                         "median [ms]": round(float(np.median(times)), 1),
                         "95 % [ms]": round(float(np.percentile(times, 95)), 1),
+                        "CPU [ms]": round(1000 * cpu / max(len(times), 1), 1),
+                    }
+                if name == "free":
+                    cpu, began = spent(server), time.perf_counter()
+                    times = pushed(browser, moves)
+                    found["pushed by the pointer"] = {
+                        "steps a second": round(len(times) / (time.perf_counter() - began), 1),
+                        "median [ms]": round(float(np.median(times)), 1),
+                        "95 % [ms]": round(float(np.percentile(times, 95)), 1),
+                        "CPU [ms]": round(1000 * (spent(server) - cpu) / max(len(times), 1), 1),
                     }
                 server.send_signal(signal.SIGINT)
                 server.wait(WAIT)

@@ -9,6 +9,7 @@ export class Hand {
     this.model = model; this.table = table; this.connection = connection;
     this.on = false;
     this.rows = [];
+    this.frames = [];     /* from asking to an answer [ms], for whoever measures */
     connection.addEventListener("pushed", (event) => this.pushed(event.detail));
     connection.addEventListener("closed", () => { this.waiting = false; });
     model.addEventListener("loaded", () => this.turn(false));
@@ -61,7 +62,7 @@ export class Hand {
 
   pushed(answer) {
     if (!this.waiting) return;
-    this.frame = performance.now() - this.waiting;
+    if (this.frames.length < MOST) this.frames.push(performance.now() - this.waiting);
     this.waiting = false;
     if (!this.on) return;
     this.object = answer.object;
