@@ -199,7 +199,7 @@ def test_a_drawing_is_dropped_and_the_link_brings_it_back(page):
     page.wait("location.hash.length > 100")
     time.sleep(0.5)  # the link is written a moment after the last change
     link, scene = page.browser.current_url, page.scene
-    page.js(drop, "notes.txt", "nothing")
+    page.js(drop, "notes.pdf", "nothing")
     page.wait("!document.getElementById('banner').hidden")
     assert "no kind of file" in page.text("banner")
     assert page.scene == scene

@@ -13,6 +13,7 @@ import pytest
 
 import flatpush as fp
 from flatpush import compiling
+from flatpush.cli.view import _shown as shown_first
 from flatpush.control import Camera
 from flatpush.control.tracking.simulated_run import TrackedRun
 from flatpush.documents import mapping_of, parse_plan, parse_scene, scene_document, scene_template
@@ -469,6 +470,18 @@ def test_a_log_of_a_run_is_played_as_it_was(short, tmp_path, ending):
         assert motion["segments"][0]["push"] is None
     shown = dropped(f"run{ending}", path.read_bytes(), scene=document)
     assert shown["runs"][0]["motion"]["object"] == motion["object"]
+
+
+def test_a_log_needs_the_scene_of_its_object(tmp_path):
+    log, scene = tmp_path / "run.csv", EXAMPLES / "triangle.yaml"
+    log.write_text("t\n", encoding="utf-8")
+    for file, of, said in (
+        (log, None, "Give its scene or its plan: --scene FILE"),
+        (log, scene, "line 1 names no column obj_x_mm"),
+        (scene, log, "--scene belongs to a log"),
+    ):
+        with pytest.raises(InputError, match=said):
+            shown_first(file, of)
 
 
 def test_the_wrench_of_an_arc_lies_on_the_limit_surface_where_its_twist_stands_normal(planner, document):
