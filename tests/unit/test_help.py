@@ -5,7 +5,15 @@ from typer.main import get_command
 
 from flatpush.cli.app import app
 
-COMMANDS = get_command(app).commands
+TOP = get_command(app).commands
+# A command that has commands is told by these.
+COMMANDS = {name: one for name, one in TOP.items() if not hasattr(one, "commands")}
+COMMANDS |= {
+    f"{name} {inner}": one
+    for name, group in TOP.items()
+    if hasattr(group, "commands")
+    for inner, one in group.commands.items()
+}
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

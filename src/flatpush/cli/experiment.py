@@ -38,7 +38,7 @@ def command(
         Path | None,
         typer.Option("--output", "-o", metavar="FOLDER", help="Where `all` writes its report, index.html."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Of `all`: fewer random runs, no fits.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="For `all`: fewer random runs, no fits.")] = False,
     on_cluster: Annotated[
         bool, typer.Option("--cluster", help="Spread `all` over a local Dask cluster.")
     ] = False,
