@@ -1,10 +1,11 @@
 """Plans of sliding pushes without friction: how many end at their goal in the plant, and what planning takes.
 
-    python benchmarks/sliding.py [N] [--noise]
+    python benchmarks/sliding.py [N] [--noise] [NAME ...]
 
-N random queries (default 50) of each object, starts up to 200 mm from the goal at any heading. Each plan is rolled
-out in the plant as a whole, every push from where the last one left the object. With --noise fingers have a friction
-that the planner does not know, the pose is seen with noise, and it plans again after each push.
+N random queries (default 50) of each object or of the named ones, starts up to 200 mm from the goal at any heading.
+Each plan is rolled out in the plant as a whole, every push from where the last one left the object. With --noise
+fingers have a friction that the planner does not know, the pose is seen with noise, and after each push the rest of
+the plan is adjusted, or a new one made where that is not possible.
 """
 
 import sys
@@ -59,18 +60,21 @@ def within(pose: Array, times: float = 1.0) -> bool:
     return bool(np.hypot(*off[:2]) <= times * NEAR and off[2] <= times * NEAR_ANGLE)
 
 
-def main(count: int, noisy: bool) -> None:
+def main(count: int, noisy: bool, names: list[str]) -> None:
     for name, thing in objects().items():
+        if names and name not in names:
+            continue
         plant, rng = plant_of(thing), np.random.default_rng(1)
         planner = SlidePlanner(plant)
         took, good, numbers, misses = [], 0, [], []
         for _ in range(count):
             pose = drawn(rng)
-            table = plant_of(thing, FRICTION) if noisy else plant
+            table, rest = plant_of(thing, FRICTION) if noisy else plant, ()
             for _ in range(LOOKS if noisy else 1):
                 seen = pose + noisy * SEEN * rng.normal(size=3)
                 began = time.process_time()
-                plan = planner.plan(seen, np.zeros(3))
+                plan = planner.continued(rest, seen, np.zeros(3)) or planner.plan(seen, np.zeros(3))
+                rest = plan.pushes[1:]
                 took.append(time.process_time() - began)
                 for push in plan.pushes[: 1 if noisy else None]:
                     pose = pushed(table, pose, push.tip)
@@ -89,4 +93,8 @@ def main(count: int, noisy: bool) -> None:
 
 if __name__ == "__main__":
     words = sys.argv[1:]
-    main(next((int(w) for w in words if w.isdigit()), 50), "--noise" in words)
+    main(
+        next((int(w) for w in words if w.isdigit()), 50),
+        "--noise" in words,
+        [w for w in words if w in objects()],
+    )
