@@ -11,7 +11,7 @@ from flatpush.control.horizon.contact_car import contact_car, drift_of, sides_of
 from flatpush.control.horizon.controller import HorizonController
 from flatpush.control.horizon.landings import next_push
 from flatpush.control.horizon.push_knowledge import shared, steering_of
-from flatpush.control.horizon.rest_of_path import biarc, rest_of_path
+from flatpush.control.laws.rest_of_path import biarc, rest_of_path
 from flatpush.control.loop.closed_loop import drive
 from flatpush.experiments.feedback import attempt, objects, perturbed, task
 from flatpush.friction import Ellipsoid

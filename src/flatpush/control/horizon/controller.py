@@ -13,6 +13,7 @@ from ...planning import Planner
 from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
 from ..laws.push_controller import pusher_velocity
+from ..laws.rest_of_path import rest_of_path
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
 from ..loop.frames import hand, mean_pose, predicted
@@ -22,7 +23,6 @@ from .contact_car import ContactCar
 from .contact_observer import EDGE, LOST, ContactObserver, nearest_contact
 from .landings import next_push
 from .push_knowledge import Steering, shared, steering_of
-from .rest_of_path import rest_of_path
 from .state import HorizonState, LearningWindow
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover

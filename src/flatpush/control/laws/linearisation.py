@@ -20,7 +20,7 @@ from ..loop.limits import Limits
 from ..loop.measurement import STOP, Command
 from .formulas import CAP, FLOOR, MOST_SHARE, AxisGains, Bounds, FlatPose, FlatTarget, linearised
 from .gains import HOLDS, Gains, Hold
-from .path_following import path_command
+from .path_following import EASY, closing_turn, path_command
 from .push_controller import AbstractPushController, pusher_velocity
 from .reference import AbstractReference, PathReference, check_reference
 from .steering_model import SteeringModel
@@ -118,6 +118,7 @@ class TrackingController(_Linearised):
         limits, body, stale, noise: see AbstractController.
         reference: of the flat point; one with time laws is tracked at its largest speed, by a clock that slows down.
         finish: after the reference has ended, follow its path on until its end is abeam.
+        closing: see PathController; the path law then has all of the last stretch.
 
     Raises:
         InputError: for gains that are unstable at the rate, and references that rest or reverse on the way or turn
@@ -126,6 +127,7 @@ class TrackingController(_Linearised):
 
     reference: AbstractReference = None  # type: ignore[assignment]
     finish: bool = True
+    closing: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         self._check()
@@ -177,6 +179,8 @@ class TrackingController(_Linearised):
         """Before its end the reference is left for its path, so that there is room to come to rest [s]."""
         if not (self.finish and isinstance(self.reference, PathReference)):
             return 0.0
+        if self.closing is not None:
+            return 1 / (EASY * min(self.model.left, self.model.right)) / self.reference.speed
         return 0.5 * self.reference.speed / self.deceleration + (
             2 / self.rate if np.isfinite(self.deceleration) else 0
         )
@@ -192,6 +196,9 @@ class TrackingController(_Linearised):
         if found is None:
             return self._stop(state, time, ARRIVED)
         speed, omega, length, _ = found
+        if self.closing is not None:
+            turn = closing_turn(self.model, path, pose, length, speed * dt, self.closing)
+            omega = omega if turn is None else turn * speed
         return self._command(replace(state, mode="path", note="", length=length), pose, time, speed, omega)
 
 

@@ -14,10 +14,14 @@ from .formulas import along_path, nearest, place, wrapped
 from .gains import limits
 from .push_controller import AbstractPushController, pusher_velocity
 from .reference import PathReference
+from .rest_of_path import rest_of_path
 from .steering_model import SteeringModel
 
 # Poles of the default gains, per turning radius of the flat point: both at -2 / R.
 POLE = 2.0
+# Over the last stretch, a turning radius long, a law that closes plans what is left anew in every tick where
+# it is off the path by more than a share of the tolerance, with turns of a share of the tightest where they do.
+ON_PATH, EASY = 0.15, 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,39 @@ def path_command(
     return speed, kappa * speed, length, bounded
 
 
+def closing_turn(
+    model: SteeringModel,
+    path: PathReference,
+    pose: Array,
+    length: float,
+    step: float,
+    tolerance: tuple[float, float],
+) -> float | None:
+    """Turn per length [1/m] that leads to the end of a path from where the object is; None before the last stretch and
+    on the path.
+
+    A law that only comes nearer to the path leaves what a landing was off by where the push is short.
+
+    Args:
+        length: arc length abeam [m]. step: that is driven in this tick [m].
+        tolerance: of the object's place [m] and angle [rad], by which errors compare where both cannot be met.
+    """
+    left, radius = path.length - length, 1 / (EASY * min(model.left, model.right))
+    if left > radius:
+        return None
+    x, y, heading = model.flat_of(pose)
+    # Off an ellipsoid the way of the flat point is at an angle to the heading.
+    px, py, angle, bend = place(path.table, length)
+    way = x, y, heading + math.atan(model.across(1.0, bend))
+    if max(math.hypot(x - px, y - py) / tolerance[0], abs(wrapped(way[2] - angle)) / tolerance[1]) < ON_PATH:
+        return None
+    lever = float(model.flat_point @ model.direction)
+    rest = rest_of_path(
+        way, place(path.table, path.length)[:3], radius, model.left, model.right, left, step, lever, tolerance
+    )
+    return None if rest.how == "past" else rest.curvature
+
+
 @dataclass(frozen=True, eq=False)
 class PathController(AbstractPushController[PathState]):
     """Follows a path at its flat speed or with its time law, wherever along it the object is.
@@ -80,6 +117,7 @@ class PathController(AbstractPushController[PathState]):
         model: of the push. path: of its flat point, and the flat speed. rate: of the ticks [Hz].
         stiffness, damping: gains k₁ [1/m²] and k₂ [1/m]; default: see path_gains.
         deceleration: of the flat point at the end [m/s²].
+        closing: the tolerance [m, rad] of a law that plans the last stretch anew in every tick; see closing_turn.
         limits, body, stale, noise: see AbstractController.
 
     Raises:
@@ -92,6 +130,7 @@ class PathController(AbstractPushController[PathState]):
     stiffness: float | None = None
     damping: float | None = None
     deceleration: float = float("inf")
+    closing: tuple[float, float] | None = None
     limits: Limits | None = None
     body: str = ""
     stale: float = 0.5
@@ -134,6 +173,9 @@ class PathController(AbstractPushController[PathState]):
         if found is None:
             return replace(state, mode="done", outcome=ARRIVED, length=self.path.length), STOP
         speed, omega, length, bounded = found
+        if self.closing is not None:
+            turn = closing_turn(self.model, self.path, pose, length, speed * dt, self.closing)
+            omega = omega if turn is None else turn * speed
         velocity = pusher_velocity(self.model, pose, speed, omega, dt)
         mode, note = ("saturated", "at the edge of the friction cone") if bounded else ("path", "")
         return replace(state, mode=mode, note=note, length=length), Command(velocity)

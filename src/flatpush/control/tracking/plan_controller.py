@@ -23,6 +23,7 @@ from ..loop.limits import Limits
 from ..loop.measurement import Command, Measurement
 from .carried import CarriedController
 from .learning_controller import LearningController
+from .touching import TouchingController
 
 # A hand so far before or behind its place at the contact has lost the object, by the object's size; beside it, so far.
 LOST_AHEAD, LOST_ASIDE = 0.25, 1.0
@@ -39,7 +40,7 @@ SLOW = 0.03
 #: How the outcome of a run begins that ended off its goal.
 BESIDE = "ended beside the goal"
 
-OnePush = TrackingController | PathController | LearningController | CarriedController
+OnePush = TrackingController | PathController | LearningController | CarriedController | TouchingController
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +129,8 @@ class PlanController(AbstractController[PlanState]):
         scene, first = plan.scene, plan.pushes[0]
         limits = Limits.of(scene.pusher, first.fingers, scene.object.outline.size)
         goal = scene.planning.goal_tolerance
-        within = (float(min(goal[:2])), float(goal[2])) if tolerance is None else tolerance
+        usual = float(min(goal[:2])), float(goal[2])
+        within = usual if tolerance is None else tolerance
         if not min(within) > 0:
             raise InputError("a tolerance is positive", key="tolerance", value=within)
         gentle = replace(
@@ -164,6 +166,10 @@ class PlanController(AbstractController[PlanState]):
                 )
             elif learn:
                 one = _learning(scene, option, one, sd)
+            else:
+                one = replace(one, closing=usual)  # the run is the same whatever is asked of its end
+                if scene.pusher.turns:
+                    one = TouchingController(one, scene.object.outline, scene.pusher.tip_radius)
             found.append(one)
         return cls(plan, tuple(found), within, limits, stale, sd)
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ...steering.dubins import DubinsPath, shortest_path
-from ..laws.formulas import wrapped
+from .formulas import wrapped
 
 #: "even": two arcs, none tighter than with the reserve; "planned": a Dubins path with the reserve; "tight": one with
 #: the widest turns that lead there, as far as feedback may use them; "closing": none leads there without a loop, and
