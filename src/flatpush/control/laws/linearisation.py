@@ -118,7 +118,7 @@ class TrackingController(_Linearised):
         limits, body, stale, noise: see AbstractController.
         reference: of the flat point; one with time laws is tracked at its largest speed, by a clock that slows down.
         finish: after the reference has ended, follow its path on until its end is abeam.
-        closing: see PathController; the path law then has all of the last stretch.
+        closing: tolerance [m, rad], see PathController; the path law then has all of the last stretch.
 
     Raises:
         InputError: for gains that are unstable at the rate, and references that rest or reverse on the way or turn
