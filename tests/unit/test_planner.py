@@ -125,7 +125,7 @@ def test_automatic_pushes_are_sought_once_for_an_object(triangle):
 
 def test_no_automatic_push_at_all_is_no_plan_that_can_be_saved(triangle, tmp_path):
     slippery = fp.Object(triangle.outline, "uniform", friction=0.0)
-    found = fp.plan(fp.Scene(slippery, STARTS[0]))
+    found = fp.plan(fp.Scene(slippery, STARTS[0], planning=fp.Planning(slides="never")))
     assert found.status == "no_plan"
     assert "without friction" in found.reason
     found.save(tmp_path / "plan.json")

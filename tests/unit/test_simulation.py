@@ -220,7 +220,8 @@ def test_edited_plans_are_refused(one_finger_plan):
 
 
 def test_no_plan_cannot_be_verified_or_rolled_out(rectangle):
-    plan = fp.plan(fp.Scene(replace_friction(rectangle, 0.0), (0.02, -0.05, 0.3)))
+    never = fp.Planning(slides="never")
+    plan = fp.plan(fp.Scene(replace_friction(rectangle, 0.0), (0.02, -0.05, 0.3), planning=never))
     assert plan.status == "no_plan"
     assert "without friction" in plan.reason
     for judge in (fp.verify, fp.simulate):

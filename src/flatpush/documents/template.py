@@ -59,6 +59,9 @@ goal: [0, 0, 0]                   # [0, 0, free]: any angle
 #   bounds: [-225, -127, 225, 127]              # xmin, ymin, xmax, ymax
 #   obstacles: [[[80, 60], [120, 60], [120, 90]], {circle: 20, centre: [-60, 80]}]
 
+# Recordings of pushes for flatpush identify: their own names of columns, and the units of those that tell none.
+# logs: {columns: {x: obj_x, theta: yaw}, length: mm, angle: deg}
+
 # How to plan; every key may be left out, and the values here are the defaults.
 planning:
   model: exact                    # friction with the table: exact, ellipsoid, local or quartic
