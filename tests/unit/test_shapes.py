@@ -96,8 +96,11 @@ def test_holes_are_left_out(tmp_path: Path) -> None:
     [
         ("", "no lines"),
         ('<text x="1" y="1">hello</text>', "no lines"),
-        ('<path d="M 0 0 L 10 0 L 10 10" fill="none"/>', "not closed"),
-        ('<circle cx="4" cy="4" r="2"/><path d="M 0 0 H 9 V 9 H 0 V 1" fill="none"/>', "not closed"),
+        ('<path d="M 0 0 L 10 0 L 10 10" fill="none" stroke="black"/>', "not closed"),
+        (
+            '<circle cx="4" cy="4" r="2"/><path d="M 0 0 H 9 V 9 H 0 V 1" fill="none" stroke="black"/>',
+            "not closed",
+        ),
         ('<rect width="9" height="9"/><rect x="20" width="9" height="9"/>', "2 outer contours"),
         ('<rect width="9" height="9"/><rect x="4" y="4" width="9" height="4"/>', "2 outer contours"),
         ('<path d="M 0 0 L 10 10 L 10 0 L 0 8 Z"/>', "cross"),
