@@ -22,7 +22,7 @@ MOST_ANY = 18
     [
         ["ruff", "format", "--check", "--quiet"],
         ["ruff", "check", "--quiet"],
-        ["mypy", "--no-error-summary"],
+        pytest.param(["mypy", "--no-error-summary"], marks=pytest.mark.slow),  # a minute without its cache
     ],
     ids=lambda command: " ".join(command[:2]),
 )
