@@ -1,11 +1,14 @@
 """From logs of one's own to a calibration, and from that to predictions, on the command line."""
 
 import json
+import math
 
 import numpy as np
 import pytest
 from tests.command_line import flatpush
 
+from flatpush.cli.recordings import read_recordings
+from flatpush.documents import load_robot_log
 from flatpush.documents.calibration_file import CalibrationFile, load_calibration, save_calibration
 from flatpush.errors import InputError
 from flatpush.geometry import compose, inverse
@@ -130,6 +133,65 @@ def test_a_calibration_is_kept_as_it_is(tmp_path):
     (tmp_path / "c.json").write_text('{"flatpush": "calibration/1"}')
     with pytest.raises(InputError, match="camera"):
         load_calibration(tmp_path / "c.json")
+
+
+def renamed(log, target, without=()):
+    """The same runs under names of one's own, in metres and degrees, the stamps in milliseconds."""
+    head = "what,start,try,clock [ms],ox,oy,yaw,hx [mm],hy [mm],hyaw,push"
+    rows = [line.split(",") for line in log.read_text().splitlines()[1:]]
+    lines = []
+    for row in rows:
+        v = [float(cell) for cell in row[3:10]]
+        new = [1e3 * v[0], v[1] / 1e3, v[2] / 1e3, math.degrees(v[3]), v[4], v[5], math.degrees(v[6])]
+        lines.append([*row[:3], *map(repr, new), f"no. {row[10]}"])
+    table = [head.split(","), *lines]
+    kept = [k for k, name in enumerate(table[0]) if name not in without]
+    target.write_text("".join(",".join(row[k] for k in kept) + "\n" for row in table))
+    return target
+
+
+OWN = "{object: what, run: try, t: clock, x: ox, y: oy, theta: yaw, px: hx, py: hy, ptheta: hyaw}"
+
+
+def test_names_of_columns_that_the_scene_gives_hold_for_calibrate_and_replay(tmp_path):
+    (log,) = logs(tmp_path)
+    own = renamed(log, tmp_path / "own.csv")
+    scene = tmp_path / "scene.yaml"
+    plain = json.loads(flatpush("replay", log, "--scene", scene, "--json").stdout)
+    ended = flatpush("replay", own, "--scene", scene)
+    assert ended.returncode == 2
+    assert "Traceback" not in ended.stderr
+    option = OWN[1:-1].replace(": ", "=")
+    given = flatpush("replay", own, "--scene", scene, "--columns", option, "--units", "m,deg", "--json")
+    scene.write_text(SCENE + f"logs: {{columns: {OWN}, length: m, angle: deg}}\n")
+    for ended in (given, flatpush("replay", own, "--scene", scene, "--json")):
+        assert ended.returncode == 0, ended.stderr
+        for a, b in zip(plain, json.loads(ended.stdout), strict=True):
+            assert (a["object"], a["start"], a["run"]) == (b["object"], b["start"], b["run"])
+            assert b["final"] == pytest.approx(a["final"], abs=1e-6)
+    recordings, _ = read_recordings([log, own], [scene], {})
+    assert len(recordings) == 12
+    scene.write_text(SCENE + f"logs: {{columns: {OWN.replace(', ptheta: hyaw', '')}, angle: deg}}\n")
+    ended = flatpush("calibrate", own, "--scene", scene)
+    assert ended.returncode == 2
+    assert "column ptheta" in ended.stderr
+    other = tmp_path / "other.yaml"
+    other.write_text(SCENE.replace("name: block", "name: disc") + "logs: {columns: {x: ox}}\n")
+    assert "differently" in flatpush("calibrate", own, "--scene", scene, "--scene", other).stderr
+
+
+def test_an_object_that_was_not_seen_has_empty_cells_under_names_of_ones_own(tmp_path):
+    path = tmp_path / "own.csv"
+    path.write_text("t,ox,y,theta,px,py\n0,0,0,0,1,2\n1,,,,1,2\n2,nan,nan,nan,1,2\n3,4,5,90,1,2\n")
+    file = load_robot_log(path, columns={"x": "ox[cm]"}, length="mm", angle="deg")
+    (run,) = file.runs
+    assert run.seen.tolist() == [True, False, False, True]
+    assert not file.turned
+    assert run.poses[3] == pytest.approx([0.04, 0.005, np.pi / 2])
+    assert run.hands[3] == pytest.approx([0.001, 0.002, 0])
+    path.write_text("t,ox,y,theta,px,py\n0,0,,0,1,2\n")
+    with pytest.raises(InputError, match="line 2: y is not a number"):
+        load_robot_log(path, columns={"x": "ox"})
 
 
 def test_what_does_not_belong_together_is_refused(tmp_path):

@@ -10,7 +10,7 @@ import yaml
 import flatpush as fp
 from flatpush.cli.app import main
 from flatpush.documents import load_motions
-from flatpush.documents.motion_file import Motion
+from flatpush.documents.motion_file import Motion, is_motion_file, own_or_plain
 from flatpush.errors import InputError
 from flatpush.friction import Support
 from flatpush.geometry import Outline, compose, log, rotate, transform
@@ -245,7 +245,7 @@ def test_from_a_log_with_names_of_its_own_to_a_scene(tmp_path, scene, run):
 
 
 def test_a_scene_gives_names_and_units_of_its_recordings_once(tmp_path, scene, run):
-    from flatpush.documents.motion_file import columns_of_scene, load_motions
+    from flatpush.documents import columns_of_scene, load_motions
 
     motions = pushed(pushes=PUSHES[:2])
     log = written(motions, tmp_path / "log.csv", "stamp,ox,oy,yaw,tip_x,tip_y,try")
@@ -390,6 +390,47 @@ def test_bad_rows_are_named_by_line_and_leave_no_traceback(tmp_path, scene, run,
     assert re.search(words, err), err
     assert "Traceback" not in err
     assert not (tmp_path / "fitted.yaml").exists()
+
+
+def test_a_column_fx_makes_no_wrench(tmp_path, scene, run):
+    """A finger's own names fx, fy made the file a table of wrenches, although the names said what they are."""
+    log = written(
+        pushed(pushes=PUSHES[:2]), tmp_path / "log.csv", "t,x [mm],y [mm],theta [deg],fx [mm],fy [mm],push"
+    )
+    own = {"px": "fx", "py": "fy"}
+    assert is_motion_file(log, own)
+    assert is_motion_file(log)  # and then px is missed, not tau
+    status, _, err = run(log, "--scene", scene)
+    assert status == 2
+    assert "names no column px" in err
+    assert "--columns px=NAME" in err
+    both = tmp_path / "both.csv"
+    both.write_text("t,x,y,theta,px,py,fx,fy,tau,vx,vy,omega\n")
+    assert not is_motion_file(both)
+    assert is_motion_file(both, {"x": "x"})
+    pairs = tmp_path / "pairs.csv"
+    pairs.write_text("fx,fy,tau,vx,vy,omega\n1,0,0,1,0,0\n")
+    assert not is_motion_file(pairs, own)
+    scene.write_text(SCENE + "logs: {columns: {px: fx, py: fy}}\n")
+    log.write_text("t,x,y,theta,fx,fy\n0,0,0,0,1,a\n")
+    status, _, err = run(log, "--scene", scene)
+    assert status == 2
+    assert "line 2: py is not a number" in err
+
+
+def test_our_own_logs_are_read_in_spite_of_the_names_that_a_scene_gives(tmp_path, scene):
+    own = {"x": "ox", "px": "tip_x"}
+    plain = written(pushed(pushes=PUSHES[:1]), tmp_path / "watched.csv")
+    named = written(pushed(pushes=PUSHES[:1]), tmp_path / "own.csv", "t,ox,y,theta,tip_x,py,push")
+    assert own_or_plain(plain, own) is None
+    assert own_or_plain(named, own) == own
+    followed = tmp_path / "followed.csv"
+    followed.write_text(
+        "t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id\n"
+        "0,1,2,0,3,4,0,1\n0.1,1,2,0,3,4,0,1\n"
+    )
+    (motion,) = load_motions(followed, columns=own).motions
+    assert motion.tips[0] == pytest.approx([0.003, 0.004])
 
 
 def test_motion_needs_a_scene_and_wrenches_no_columns(tmp_path, scene, run):

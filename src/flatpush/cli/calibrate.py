@@ -7,12 +7,15 @@ from typing import Annotated
 import typer
 
 from .common import print_json, telling
-from .recordings import carried_of, read_recordings
+from .recordings import COLUMNS, UNITS, carried_of, read_recordings
 
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOGS…", help="Logs of runs, as run --log writes them.")
+        list[Path],
+        typer.Argument(
+            metavar="LOGS…", help="Logs of runs, as run --log writes them, or CSV with names of your own."
+        ),
     ],
     scene: Annotated[
         list[Path], typer.Option(metavar="SCENE", help="The scene of the object; once for each object.")
@@ -24,6 +27,8 @@ def command(
         list[str] | None,
         typer.Option(metavar="OBJECT=TAG", help="Objects that carry one tag; as often as needed."),
     ] = None,
+    columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
+    units: Annotated[str, typer.Option(metavar="UNITS", help=UNITS)] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Fit camera map, tag offsets, finger inset, lag and friction to LOGS, judged on starts that were left out."""
@@ -35,7 +40,7 @@ def command(
 
     check_outputs([*logs, *scene], [output])
     carried = carried_of(tag)
-    recordings, setup = read_recordings(logs, scene, carried)
+    recordings, setup = read_recordings(logs, scene, carried, columns=columns, units=units)
     with telling("calibrating"):
         found = calibrate(recordings, setup)
     p, left = found.parameters, found.left_out

@@ -8,6 +8,7 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
+from .recordings import COLUMNS, UNITS, layout_of
 
 if TYPE_CHECKING:
     from ..friction import Quartic
@@ -55,8 +56,7 @@ def command(
         str | None,
         typer.Option(
             metavar="UNITS",
-            help="Units of columns that do not name them: m, cm or mm, and rad or deg; by default the scene's logs, or"
-            " m,rad.",
+            help=UNITS,
         ),
     ] = None,
     length: Annotated[
@@ -72,9 +72,7 @@ def command(
     skip_bad: Annotated[
         bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")
     ] = False,
-    columns: Annotated[
-        str, typer.Option(metavar="NAMES", help="Your own names of columns of motion: x=obj_x[mm],theta=yaw.")
-    ] = "",
+    columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
     suggests: Annotated[
         bool, typer.Option("--suggest", help="From motion: the next three pushes that would teach most.")
     ] = False,
@@ -98,7 +96,8 @@ def command(
     if length is not None and not 0 < length < float("inf"):
         raise InputError("--length is positive and finite", value=length)
     check_outputs([*data, *(() if scene is None else scene_files(scene))], [output, figure])
-    moves = [is_motion_file(path) for path in data]
+    own = layout_of([] if scene is None else [scene], columns, units or "")[0]
+    moves = [is_motion_file(path, own) for path in data]
     if any(moves):
         if not all(moves):
             raise InputError(
@@ -239,7 +238,7 @@ def _read(data: list[Path], units: str, skip_bad: bool, pool: bool) -> tuple[lis
 
     from ..documents import load_pairs
     from ..friction.pairs import Pairs
-    from .identify_motion import units_of
+    from .recordings import units_of
 
     parts = units_of(units)
     experiments: list[Any] = []

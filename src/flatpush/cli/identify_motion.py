@@ -9,6 +9,7 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
+from .recordings import layout_of
 
 if TYPE_CHECKING:
     from ..documents import Motion
@@ -33,21 +34,18 @@ class Asked:
 
 def identify_motion(asked: Asked) -> int:
     """Fits, prints, writes the scene."""
-    from ..documents import load_motions, load_scene, own_columns, save_fitted_scene
-    from ..documents.motion_file import columns_of_scene
+    from ..documents import load_motions, load_scene, save_fitted_scene
+    from ..documents.motion_file import own_or_plain
     from ..identification import fit_motion, radii, suggest, summarise
     from ..planning.candidates import automatic_pushes
 
     if asked.output is not None and asked.output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError("the fitted scene is a YAML file", source=str(asked.output), hint="-o fitted.yaml")
-    length, angle = units_of(asked.units or "m,rad")
-    columns = own_columns(asked.columns) if asked.columns else None
+    own, length, angle = layout_of([asked.scene], asked.columns, asked.units)
     scene = load_scene(asked.scene, unknown=True)
-    if (given := columns_of_scene(asked.scene)) is not None:
-        columns = columns or given[0]
-        length, angle = (length, angle) if asked.units else given[1:]
     motions: list[Motion] = []
     for path in asked.data:
+        columns = own if asked.columns else own_or_plain(path, own)
         file = load_motions(path, columns=columns, length=length, angle=angle, skip_bad=asked.skip_bad)
         if file.of_hand and scene.pusher.fingers == 2:
             raise InputError(
@@ -82,14 +80,6 @@ def identify_motion(asked: Asked) -> int:
     if asked.output is not None:
         typer.echo(f"wrote {asked.output}")
     return 0
-
-
-def units_of(text: str) -> tuple[str, str]:
-    """Length and angle of --units."""
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 2:
-        raise InputError("--units takes a length and an angle, such as mm,deg", value=text)
-    return parts[0], parts[1]
 
 
 def _lines(

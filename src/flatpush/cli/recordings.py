@@ -12,9 +12,20 @@ if TYPE_CHECKING:
     from ..simulation.calibration import Setup
     from ..simulation.replay import Recording
 
+COLUMNS = (
+    "Your own names of columns: x=obj_x[mm],theta=yaw; by default those that the scene gives for its logs."
+)
+UNITS = "Units of columns that do not name them: m, cm or mm, and rad or deg; by default the scene's logs, or m,rad."
+
 
 def read_recordings(
-    logs: Sequence[Path], scenes: Sequence[Path], carried: Mapping[str, str], pivot: "Array | None" = None
+    logs: Sequence[Path],
+    scenes: Sequence[Path],
+    carried: Mapping[str, str],
+    pivot: "Array | None" = None,
+    *,
+    columns: str = "",
+    units: str = "",
 ) -> "tuple[tuple[Recording, ...], Setup]":
     """The runs in logs, and objects, fingers and tags.
 
@@ -24,6 +35,7 @@ def read_recordings(
         logs: files. scenes: one for each object, of one pusher.
         carried: which tag an object carries, where several share one.
         pivot: of the camera's map (2,) [m]; default: amid the runs.
+        columns, units: the options of these names; by default what the scenes say of their logs.
 
     Raises:
         InputError: for a log or a scene that is none, scenes of different pushers or of one name.
@@ -41,9 +53,17 @@ def read_recordings(
     for path, scene in read[1:]:
         if scene.pusher != read[0][1].pusher:
             raise InputError("all scenes have the same pusher", source=str(path), key="pusher")
+    own, length, angle = layout_of(scenes, columns, units)
     recordings = []
     for log in logs:
-        found = load_robot_log(log).runs
+        file = load_robot_log(log, columns=own, length=length, angle=angle)
+        if not file.turned and read[0][1].pusher.fingers == 2:
+            raise InputError(
+                "the turn of a hand with two fingers is not in this log",
+                source=str(log),
+                hint="It has a column ptheta, or one of your own: --columns ptheta=NAME.",
+            )
+        found = file.runs
         for run in found:
             alone = len(read) == 1 and run.object not in names and len({r.object for r in found}) == 1
             recordings.append(Recording.of(replace(run, object=names[0]) if alone else run))
@@ -63,6 +83,36 @@ def read_recordings(
     middle = np.mean([one.final[:2] for one in recordings], axis=0) if pivot is None else pivot
     objects = {scene.object.name: scene.object for _, scene in read}
     return tuple(recordings), Setup(objects, fingers, pusher.tip_radius, middle, dict(carried))
+
+
+def layout_of(scenes: Sequence[Path], columns: str, units: str) -> tuple[dict[str, str], str, str]:
+    """Names of columns, and units of length and angle, by the options --columns and --units, else by what the scenes
+    say of their logs.
+
+    Raises:
+        InputError: for options that are none, or scenes that say different things.
+    """
+    from ..documents import columns_of_scene, own_columns
+
+    told = [one for path in scenes if (one := columns_of_scene(path)) is not None]
+    if not columns and any(one != told[0] for one in told):
+        raise InputError(
+            "the scenes name the columns of their logs differently",
+            key="logs",
+            hint="Give the names of these logs by --columns and --units.",
+        )
+    own, length, angle = told[0] if told else ({}, "m", "rad")
+    if columns:
+        own = own_columns(columns)
+    return (own, *units_of(units)) if units else (own, length, angle)
+
+
+def units_of(text: str) -> tuple[str, str]:
+    """Length and angle of --units."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise InputError("--units takes a length and an angle, such as mm,deg", value=text)
+    return parts[0], parts[1]
 
 
 def carried_of(texts: Sequence[str] | None) -> dict[str, str]:

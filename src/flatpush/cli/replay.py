@@ -9,12 +9,15 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
-from .recordings import read_recordings
+from .recordings import COLUMNS, UNITS, read_recordings
 
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOGS…", help="Logs of runs, as run --log writes them.")
+        list[Path],
+        typer.Argument(
+            metavar="LOGS…", help="Logs of runs, as run --log writes them, or CSV with names of your own."
+        ),
     ],
     scene: Annotated[
         list[Path], typer.Option(metavar="SCENE", help="The scene of the object; once for each object.")
@@ -27,6 +30,8 @@ def command(
         Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write one row for each run.")
     ] = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw every run as a dot.")] = None,
+    columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
+    units: Annotated[str, typer.Option(metavar="UNITS", help=UNITS)] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Move the simulated fingers as in LOGS and compare where the object ends with where the camera saw it."""
@@ -50,7 +55,7 @@ def command(
         kept = load_calibration(calibration)
         p = Parameters(kept.camera, kept.tags, kept.inset, kept.friction, kept.lag)
         carried, pivot = kept.carried, kept.pivot
-    recordings, setup = read_recordings(logs, scene, {}, pivot)
+    recordings, setup = read_recordings(logs, scene, {}, pivot, columns=columns, units=units)
     setup = type(setup)(setup.objects, setup.fingers, setup.tip_radius, setup.pivot, carried)
     unknown = [n for n in setup.objects if p.tags and setup.tag(n) not in p.tags]
     if unknown:

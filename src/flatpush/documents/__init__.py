@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from .export import export_csv, export_rapid
     from .files_read import as_read, plan_files, scene_files
     from .fitted_scene import save_fitted_scene
-    from .motion_file import Motion, MotionFile, is_motion_file, load_motions, own_columns
+    from .log_columns import columns_of_scene, own_columns
+    from .motion_file import Motion, MotionFile, is_motion_file, load_motions
     from .outline_reader import OutlineNote, outline_note
     from .pairs_file import PairsFile, load_pairs
     from .plan_file import load_plan, parse_plan, plan_document, save_plan
@@ -37,6 +38,7 @@ __all__ = [
     "as_read",
     "check_outputs",
     "check_writable",
+    "columns_of_scene",
     "export_csv",
     "export_rapid",
     "is_motion_file",
@@ -73,7 +75,8 @@ _HOME = {
     "MotionFile": "motion_file",
     "is_motion_file": "motion_file",
     "load_motions": "motion_file",
-    "own_columns": "motion_file",
+    "columns_of_scene": "log_columns",
+    "own_columns": "log_columns",
     "save_fitted_scene": "fitted_scene",
     "OutlineNote": "outline_reader",
     "PairsFile": "pairs_file",

@@ -12,14 +12,13 @@ import numpy as np
 from ..errors import InputError, MissingExtra
 from ..geometry.pose import Array, wrap_angle
 from .context import PER_METRE
-from .pairs_file import HEADER, csv_lines
-from .reading import read_mapping, read_text
+from .log_columns import GROUP, ROLES, bare, column, holds
+from .log_columns import columns as columns_of
+from .pairs_file import PLAIN, RECORDED, csv_lines
+from .reading import read_text
 from .robot_log import RAW, load_robot_log
-from .rows import BadRow, Unusable, number, refusal
+from .rows import BadRow, Unusable, is_number, number, refusal
 
-# What is read, and the names that columns have of themselves.
-ROLES = ("t", "x", "y", "theta", "px", "py")
-GROUP = "push"
 MOST_BYTES = 100_000_000
 # A recording ends where rows are missing for so long, or the finger is suddenly elsewhere [s, m].
 GAP, ELSEWHERE = 1.0, 0.009
@@ -92,13 +91,12 @@ def load_motions(
     if header is None:
         raise InputError("the file is empty", source=source, hint=_FORMAT)
     names = [cell.strip() for cell in header[1]]
-    if not columns and (RAW[1] in names or _is_number(names[0])):
+    own = columns or {}
+    if (RAW[1] in names or is_number(names[0])) and not holds(names, own):
         return _from_robot(source, skip_bad)
-    places, factors = _places(names, columns or {}, length, angle, source)
-    parted = (columns or {}).get(GROUP, GROUP)
-    if parted != GROUP and parted not in names:
-        raise InputError(f"line 1 names no column {parted}", source=source, value=",".join(names))
-    group = names.index(parted) if parted in names else None
+    places, factors = columns_of(names, ROLES, own, length, angle, source)
+    there = GROUP in own or GROUP in (bare(name) for name in names)
+    group = column(names, GROUP, own, source)[0] if there else None
     rows: dict[str, list[tuple[int, list[float]]]] = {}
     bad: list[BadRow] = []
     for line, cells in lines:
@@ -130,99 +128,32 @@ def load_motions(
     return MotionFile(tuple(motions), tuple(bad))
 
 
-def is_motion_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is not a table of wrenches and twists, by its ending and its first line."""
+def own_or_plain(path: str | os.PathLike[str], own: Mapping[str, str] | None) -> Mapping[str, str] | None:
+    """The names that a scene gives for columns, unless a file has the plain ones instead: one of our own logs."""
+    if not own or Path(path).suffix.lower() == ".mcap":
+        return None
+    first = next(csv_lines(read_text(path, MOST_BYTES), os.fspath(path)), (0, []))[1]
+    return None if holds(first, {}) and not holds(first, own) else own
+
+
+def is_motion_file(path: str | os.PathLike[str], own: Mapping[str, str] | None = None) -> bool:
+    """Whether a file is a recording of motion, not a table of wrenches and twists: by its ending and its first line.
+
+    A column fx alone makes no wrench: it may be a finger's.
+
+    Args:
+        own: the file's own names of columns.
+    """
     source = os.fspath(path)
     if Path(source).suffix.lower() == ".mcap":
         return True
     first = next(csv_lines(read_text(path, MOST_BYTES), source), (0, []))[1]
-    names = {match[1] for cell in first if (match := HEADER.fullmatch(cell))}
-    return not names & {"fx", "Fx"}
-
-
-def own_columns(text: str) -> dict[str, str]:
-    """The names of columns in "x=obj_x[mm],theta=yaw[deg]".
-
-    >>> own_columns("x=obj_x[mm], theta=yaw")
-    {'x': 'obj_x[mm]', 'theta': 'yaw'}
-
-    Raises:
-        InputError: for anything else.
-    """
-    found: dict[str, str] = {}
-    for part in text.split(","):
-        role, equals, name = (piece.strip() for piece in part.partition("="))
-        if not equals or not name or role not in (*ROLES, GROUP) or role in found:
-            raise InputError(
-                f"columns are named as role=name, separated by commas; roles are {', '.join((*ROLES, GROUP))}",
-                value=part.strip(),
-            )
-        found[role] = name
-    return found
-
-
-def columns_of_scene(scene: str | os.PathLike[str]) -> tuple[dict[str, str], str, str] | None:
-    """Names of columns, and units of length and angle, that a scene file gives for recordings of its object; None if it
-    gives none.
-
-    Raises:
-        InputError: for a role that there is not.
-    """
-    logs = read_mapping(scene).get("logs")
-    if not isinstance(logs, dict):
-        return None
-    columns = dict(logs.get("columns") or {})
-    for role in columns:
-        if role not in (*ROLES, GROUP):
-            raise InputError(
-                f"columns have the roles {', '.join((*ROLES, GROUP))}",
-                source=os.fspath(scene),
-                key=f"logs.columns.{role}",
-            )
-    return columns, str(logs.get("length", "m")), str(logs.get("angle", "rad"))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.split()[0] if text else text)
-    except ValueError:
+    names = {bare(cell) for cell in first}
+    if own and holds(first, own):
+        return True
+    if names >= set(PLAIN) or names >= set(RECORDED):
         return False
-    return True
-
-
-def _places(
-    names: list[str], own: Mapping[str, str], length: str, angle: str, source: str
-) -> tuple[list[int], Array]:
-    """Column and factor to SI of each role."""
-    plain = [match[1] if (match := HEADER.fullmatch(name)) else name for name in names]
-    units = [match[2] if (match := HEADER.fullmatch(name)) else None for name in names]
-    places, factors = [], []
-    for role in ROLES:
-        given = HEADER.fullmatch(own.get(role, role))
-        wanted, unit = (given[1], given[2]) if given else (own[role], None)
-        if plain.count(wanted) != 1:
-            how = "names no column" if wanted not in plain else "names twice the column"
-            raise InputError(
-                f"line 1 {how} {wanted}",
-                source=source,
-                value=",".join(names),
-                hint=f"{_FORMAT} Names of your own: --columns {role}=NAME.",
-            )
-        k = plain.index(wanted)
-        stated = unit or units[k]
-        known = {
-            "t": {"s": 1.0, "ms": 1e-3, "ns": 1e-9},
-            "theta": {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180},
-        }
-        scale = known.get(role, {u: 1 / per for u, per in PER_METRE.items()})
-        default = {"t": "s", "theta": angle}.get(role, length)
-        if (stated or default) not in scale:
-            raise InputError(
-                f"column {wanted} has a unit among {', '.join(scale)}", source=source, value=stated
-            )
-        places.append(k)
-        factors.append(scale[stated or default])
-    return places, np.array(factors)
+    return bool(own) or names >= {"x", "y", "theta"} or not names & {"fx", "Fx"}
 
 
 def _values(cells: Sequence[str], places: Sequence[int], width: int) -> list[float] | None:

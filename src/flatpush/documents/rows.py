@@ -38,6 +38,15 @@ def number(cell: str, name: str) -> float:
     return value
 
 
+def is_number(text: str) -> bool:
+    """Whether a first cell, or what stands before its first blank, is a number: then the file names no columns."""
+    try:
+        float(text.split()[0] if text else text)
+    except ValueError:
+        return False
+    return True
+
+
 def refusal(bad: Sequence[BadRow], source: str, leave_out: str) -> InputError:
     """Of a file that holds bad rows; `leave_out` says how it is read without them."""
     named = "; ".join(f"line {row.line}: {row.reason}" for row in bad[:_MOST_NAMED])

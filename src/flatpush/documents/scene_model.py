@@ -385,7 +385,7 @@ class PlanningPart(Part):
 
 
 class LogsPart(Part):
-    """How recordings of this object are written, which `flatpush identify` reads."""
+    """How recordings of this object are written, which `flatpush identify`, `calibrate` and `replay` read."""
 
     columns: dict[Text, Text] = Field(
         default_factory=dict,
