@@ -1,13 +1,17 @@
 """A table of which nothing is known: what is refused, first pushes that are safe, and the way to the goal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flatpush import InputError, load_scene, plan
-from flatpush.control import Camera
+from flatpush.control import Camera, SimulatedSensor
+from flatpush.control.horizon.controller import HorizonController
+from flatpush.control.loop.closed_loop import drive
 from flatpush.control.loop.frames import Seen
 from flatpush.control.tracking.first_pushes import FirstPushes, TeachState, filmed, imagined, next_push
-from flatpush.control.tracking.unknown_table import drawn_table, run_unknown, same_outline
+from flatpush.control.tracking.unknown_table import BoundedPlant, drawn_table, run_unknown, same_outline
 from flatpush.documents import parse_scene
 from flatpush.geometry import rotate, transform
 from flatpush.problem import Object, Pusher, Scene, Workspace
@@ -104,6 +108,40 @@ def test_tables_by_chance_are_the_same_for_a_seed_and_stand():
         assert 0.2 <= one.friction <= 0.6
     assert same_outline(outline, Object(TRIANGLE).outline)
     assert not same_outline(outline, Object(RECTANGLE).outline)
+
+
+def test_first_pushes_stop_before_the_object_leaves_the_bounds_on_a_table_that_nobody_imagined():
+    asked = scene((0.0, -0.03, 0.1, 0.07))
+    law = replace(FirstPushes.of(asked, stale=0.6), tables=())  # any push is held for safe
+    law = replace(law, scene=replace(asked, object=drawn_table(asked.object.outline, 4)))
+    eyes = SimulatedSensor(Camera(latency=0.1, position=1e-4, angle=2e-3), np.random.default_rng(0))
+    run = drive(law, BoundedPlant(law.scene.object, asked), asked.start_pose, [-0.02, 0.02, 0], eyes, 100)
+    assert run.outcome.startswith("stopped before the object left the bounds"), run.outcome
+    assert run.modes.count("teaching") > 20
+
+
+def test_the_horizon_controller_ends_pushes_before_the_object_leaves_the_bounds():
+    """It ignored them after the first pushes; only the simulated table ended the run, and on a robot nothing would."""
+    bounds = (-0.1, -0.06, 0.1, 0.1)
+    thing = drawn_table(Object(RECTANGLE).outline, 1)
+    asked = Scene(thing, (0.05, 0.02, 0.7), (0.25, 0.0, 0.0), Pusher(fingers=1, tip_radius=0.0025))
+    free = HorizonController.of(asked, 60, 0.1, landings=3)
+    walls = replace(asked, workspace=Workspace(bounds))
+    for law in (free, replace(free, bounds=bounds)):
+        eyes = SimulatedSensor(Camera(latency=0.1, position=1e-4, angle=2e-3), np.random.default_rng(0))
+        run = drive(law, BoundedPlant(thing, walls), asked.start_pose, [0.0, 0.02, 0], eyes, 100)
+        if law is free:
+            assert run.outcome == "the object left the bounds"
+            continue
+        assert run.outcome.startswith("still")
+        assert "the bounds ended 3 of the pushes" in run.outcome
+        table = run.heights == 0
+        low, high = np.array(bounds[:2]) + 0.0025, np.array(bounds[2:]) - 0.0025
+        assert np.all((run.pusher[table, :2] >= low) & (run.pusher[table, :2] <= high))
+    no_room = replace(free, bounds=(0.04, 0.01, 0.06, 0.03))
+    eyes = SimulatedSensor(Camera(), np.random.default_rng(0))
+    run = drive(no_room, Plant(thing, [[0, 0]], 0.0025), asked.start_pose, [0.0, 0.02, 0], eyes, 20)
+    assert "where the bounds leave room for the finger" in run.outcome
 
 
 @pytest.mark.slow

@@ -7,17 +7,18 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import FlatpushError, InputError
-from ...geometry import compose, pose_error, relative
+from ...geometry import compose, pose_error, relative, transform
 from ...geometry.pose import Array
 from ...planning import Planner
 from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
 from ..laws.push_controller import pusher_velocity
 from ..laws.rest_of_path import rest_of_path
+from ..laws.steering_model import SteeringModel
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
 from ..loop.frames import hand, mean_pose, predicted
-from ..loop.limits import Limits, braking
+from ..loop.limits import Limits, beyond, braking
 from ..loop.measurement import Command, Measurement
 from .contact_car import ContactCar
 from .contact_observer import EDGE, LOST, ContactObserver, nearest_contact
@@ -43,6 +44,8 @@ RESUMES = 5
 # Pushes that failed so often are left out, and those whose straight force lies nearer to the edge of the friction cone
 # than this share of its half angle.
 FAILURES, LEEWAY = 3, 0.15
+# Object and finger keep so far from the bounds, for what a prediction over the camera's latency may be off [m].
+ROOM = 0.002
 # What another landing counts as at least: each begins with the errors of a look at the object [m].
 SWITCHING = 0.03
 
@@ -63,6 +66,8 @@ class HorizonController(AbstractController[HorizonState]):
         learn: whether the steering is learned while the finger sticks.
         body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
+        bounds: xmin, ymin, xmax, ymax [m]; a push ends before the object or the finger would leave them, and another is
+            tried. Ways are planned without regard to them.
     """
 
     scene: Scene
@@ -76,6 +81,7 @@ class HorizonController(AbstractController[HorizonState]):
     stale: float = 0.5
     sd: float = float(np.deg2rad(0.3))
     noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
+    bounds: tuple[float, float, float, float] | None = None
 
     @cached_property
     def limits(self) -> Limits:  # type: ignore[override]
@@ -198,15 +204,20 @@ class HorizonController(AbstractController[HorizonState]):
             return replace(state, mode="done", note=text, outcome=ARRIVED), self._standing(state)
         if state.landings >= self.landings:
             why = ARRIVED if inside <= 1 else f"still {text} after {state.landings} landings"
+            if state.stopped and why != ARRIVED:
+                why += f"; the bounds ended {state.stopped} of the pushes"
             return replace(state, mode="done", note=text, outcome=why), self._standing(state)
         cars = self._usable(state)
         if not any(cars):
             # Better what failed than nothing: it may go well from here, and what was learned may be wrong.
             state = replace(state, failures=(0,) * len(cars), steering=self.prior, bounds=FrictionBounds())
             cars = self._usable(state)
+        cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
             why = "no push can be steered"
+            if self.bounds is not None:
+                why += " where the bounds leave room for the finger"
             return replace(state, mode="done", outcome=why), self._standing(state)
         k, target, length = found
         place, car, hand = self.planner.usable[k].placement, cars[k], self.hand(state, time)
@@ -253,6 +264,33 @@ class HorizonController(AbstractController[HorizonState]):
             )
             cars.append(car if car is not None and car.leeway >= LEEWAY else None)
         return cars
+
+    def _has_room(self, pose: Array, option: int) -> bool:
+        """Whether the finger is inside the bounds where it lands for a push of an object at X_WO, and before."""
+        if self.bounds is None:
+            return True
+        place, pusher = self.planner.usable[option].placement, self.scene.pusher
+        assert place is not None
+        tip = place.tips[0]
+        away = self.scene.object.outline.nearest(tip).normal
+        ends = transform(pose, np.array([tip, tip - pusher.approach * away]))
+        return beyond(ends, self.bounds, pusher.tip_radius) <= 0
+
+    def _leaves(self, model: SteeringModel, pose: Array, hand: Array, velocity: Array) -> bool:
+        """Whether object or finger would be outside the bounds, and farther than now, where a hand with this velocity
+        comes to rest; X_WO and X_WE are those of now."""
+        speed = math.hypot(float(velocity[0]), float(velocity[1]))
+        if self.bounds is None or speed == 0:
+            return False
+        pusher, corners = self.scene.pusher, self.scene.object.outline.polyline()
+        rests = 1 / self.rate + 0.5 * speed / (BRAKE * pusher.acceleration)  # at this speed [s]
+        there = np.array(model.moved(*map(float, pose), float(velocity[0]), float(velocity[1]), rests))
+        now = beyond(transform(pose, corners), self.bounds, ROOM)
+        tips = np.array([hand[:2], hand[:2] + rests * velocity[:2]])
+        before, after = (beyond(tip[None], self.bounds, ROOM + pusher.tip_radius) for tip in tips)
+        return beyond(transform(there, corners), self.bounds, ROOM) > max(0.0, now) or after > max(
+            0.0, before
+        )
 
     def _go(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
         """To the next stop; then to what comes after it."""
@@ -324,6 +362,9 @@ class HorizonController(AbstractController[HorizonState]):
         speed = min(self.scene.pusher.speed / max(1.0, ratio), end + 1e-9)
         omega = rest.curvature * speed
         velocity = pusher_velocity(m, pose, speed, omega, dt)
+        if self._leaves(m, pose, self.hand(state, time), velocity):
+            ended = replace(self._failed(state), stopped=state.stopped + 1)
+            return self._retreat(ended, time, "the push would leave the bounds")
         window = state.window
         if window is not None:
             window = replace(window, ratios=(*window.ratios, car.ratio(rest.curvature)))

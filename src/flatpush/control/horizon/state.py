@@ -49,7 +49,8 @@ class HorizonState(ControllerState):
             and its gap to the edge [m].
         car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
             allowed: it ends after this at the latest [m].
-        landings, resumes: how many there were, of the latter in this push.
+        landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
+            object or the finger would have left the bounds.
         failures: how often the finger slipped, or lost the edge too often, at every option.
         steering: of every option. bounds: of the friction between finger and object. window: see LearningWindow.
     """
@@ -70,6 +71,7 @@ class HorizonState(ControllerState):
     allowed: float = np.inf
     landings: int = 0
     resumes: int = 0
+    stopped: int = 0
     failures: tuple[int, ...] = ()
     steering: tuple[Steering, ...] = ()
     bounds: FrictionBounds = field(default_factory=FrictionBounds)

@@ -169,6 +169,13 @@ def braking(length: float, deceleration: float, dt: float) -> float:
     return deceleration * (math.sqrt(dt * dt + 2 * length / deceleration) - dt)
 
 
+def beyond(points: Array, bounds: tuple[float, float, float, float], room: float = 0.0) -> float:
+    """How far the farthest of points (n, 2) lies outside of bounds (xmin, ymin, xmax, ymax) that are narrower by a room
+    on each side [m]; negative if all lie inside."""
+    low, high = np.array(bounds[:2]) + room, np.array(bounds[2:]) - room
+    return float(np.max(np.maximum(low - points, points - high)))
+
+
 class HandMotion(NamedTuple):
     """Velocity of the hand in W [m/s], its yaw rate [rad/s] and the rate at which it rises [m/s]."""
 

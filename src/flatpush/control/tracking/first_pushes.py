@@ -7,13 +7,13 @@ import numpy as np
 from ...documents.motion_file import Motion
 from ...errors import InputError
 from ...friction import Support
-from ...geometry import OutlinePoint, rotate, transform
+from ...geometry import OutlinePoint, pose_error, rotate, transform
 from ...geometry.pose import Array
 from ...problem import Object, Scene
 from ...simulation.plant import Plant
 from ..loop.controller import AbstractController, ControllerState
 from ..loop.frames import hand, mean_pose
-from ..loop.limits import Limits
+from ..loop.limits import Limits, beyond
 from ..loop.measurement import Command, Measurement
 from .plan_controller import FRAMES, LOOK, Looking, Travelling
 
@@ -25,6 +25,8 @@ PUSHES, LENGTHS = 6, (0.06, 0.045, 0.03)
 ALONG, DIRECTIONS = (0.2, 0.35, 0.5, 0.65, 0.8), np.deg2rad([-25.0, 0.0, 25.0])
 # Object and finger keep so far from the bounds on every table that is imagined [m].
 ROOM = 0.003
+# An object goes on as it moved over so much of the hand's way [m].
+BEHIND = 0.002
 # Samples of a push that is imagined.
 SAMPLES = 15
 
@@ -137,11 +139,28 @@ class FirstPushes(AbstractController[TeachState]):
         if not stops:
             return replace(state, phase=Looking(time), legs=legs), self._standing(state)
         mode = "teaching" if len(stops) == 2 else "transit"
+        if mode == "teaching" and self._leaves(state, legs[-1][0], here):
+            why = "stopped before the object left the bounds: it moves as on no table that was imagined"
+            return replace(state, mode="done", legs=legs, ending=why), self._standing(state)
         state = replace(state, mode=mode, note="", legs=legs, phase=replace(phase, stops=stops))
         table = bool(stops[0][3] == 0 and seen.height == 0)
         return state, self.limits.towards(
             stops[0], here, seen.height, seen.last, seen.climb, 1 / self.rate, table
         )
+
+    def _leaves(self, state: TeachState, begun: float, here: Array) -> bool:
+        """Whether the object would be outside the bounds where the hand, now at X_WE, comes to rest, if it goes on to
+        move with the hand as it did over the last 2 mm; the push has begun at a time [s]."""
+        bounds, velocity = self.scene.workspace.bounds, state.seen.last.velocity[:2]
+        if bounds is None or not state.film or state.film[-1][0] < begun:
+            return False
+        _, pose, at = state.film[-1]
+        ahead = float(velocity @ velocity) / (2 * self.scene.pusher.acceleration)
+        ways = ((float(np.hypot(*(at - row[2])[:2])), row) for row in reversed(state.film))
+        way, before = next(((way, row[1]) for way, row in ways if way >= BEHIND), (np.inf, pose))
+        further = (float(np.hypot(*(here - at)[:2])) + ahead) / way
+        there = pose + further * pose_error(pose, before)
+        return beyond(transform(there, self.scene.object.outline.polyline()), bounds) > 0
 
 
 def filmed(state: TeachState) -> list[Motion]:
@@ -195,7 +214,7 @@ def next_push(
         skew = 0.05 if (len(made) % 2 == 0) == (direction == 0) else 0.0
         return away + 0.15 * float(rotate(direction, at.normal) @ home) - skew
 
-    if bounds is not None and not _inside(transform(pose, outline.polyline()), bounds, 0.0):
+    if bounds is not None and beyond(transform(pose, outline.polyline()), bounds) > 0:
         return None
     options = sorted(((worth(p, float(d)), k, j) for k, p in enumerate(places) for j, d in enumerate(DIRECTIONS)),
                      reverse=True)  # fmt: skip
@@ -214,20 +233,14 @@ def _safe(
     along = rotate(direction, at.normal)
     tips = transform(pose, contact + np.outer(np.linspace(0, length, SAMPLES), along))
     begin = transform(pose, contact - pusher.approach * along)
-    if bounds is not None and not _inside(np.vstack([begin, tips]), bounds, ROOM + pusher.tip_radius):
+    if bounds is not None and beyond(np.vstack([begin, tips]), bounds, ROOM + pusher.tip_radius) > 0:
         return False
     corners = scene.object.outline.polyline()
     for plant in tables:
         run = plant.follow(pose, np.column_stack([tips, np.zeros(len(tips))]))
         if run.outcome:
             return False
-        if bounds is not None and not _inside(
-            transform(run.object[:, None, :], corners).reshape(-1, 2), bounds, ROOM
-        ):
+        at = transform(run.object[:, None, :], corners).reshape(-1, 2)
+        if bounds is not None and beyond(at, bounds, ROOM) > 0:
             return False
     return True
-
-
-def _inside(points: Array, bounds: tuple[float, float, float, float], room: float) -> bool:
-    low, high = np.array(bounds[:2]) + room, np.array(bounds[2:]) - room
-    return bool(np.all(points >= low) and np.all(points <= high))

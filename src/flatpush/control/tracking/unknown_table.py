@@ -17,6 +17,7 @@ from ...simulation.plant import Plant, PlantState
 from ..horizon.controller import HorizonController
 from ..loop.closed_loop import ClosedLoopRun, drive
 from ..loop.controller import ARRIVED, ControllerState
+from ..loop.limits import beyond
 from ..loop.sensor import AbstractSensor, Camera, SimulatedSensor
 from .first_pushes import TAUGHT, FirstPushes, TeachState, filmed
 from .plan_controller import beside
@@ -83,6 +84,7 @@ def run_unknown(
         fit = fit_motion(filmed(states[0]), scene.object, scene.pusher.tip_radius, known_support=False)
         learned = replace(scene, object=fit.thing, workspace=Workspace())
         law = HorizonController.of(learned, rate, camera.latency, True, tolerance=within)
+        law = replace(law, bounds=scene.workspace.bounds)
     except FlatpushError as wrong:
         return UnknownTableRun(
             replace(first, outcome=f"the first pushes do not tell enough: {wrong}"), None, taught
@@ -124,10 +126,10 @@ class BoundedPlant:
 
     def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
         after = self._plant.step(state, velocity, dt)
-        if self._bounds is not None and not after.outcome:
-            at = transform(after.object, self._corners)
-            if np.any(at < self._bounds[:2]) or np.any(at > self._bounds[2:]):
-                return replace(after, outcome="the object left the bounds")
+        if self._bounds is None or after.outcome:
+            return after
+        if beyond(transform(after.object, self._corners), self._bounds) > 0:
+            return replace(after, outcome="the object left the bounds")
         return after
 
 
