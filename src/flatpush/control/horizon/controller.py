@@ -284,7 +284,8 @@ class HorizonController(AbstractController[HorizonState]):
             return False
         pusher, corners = self.scene.pusher, self.scene.object.outline.polyline()
         rests = 1 / self.rate + 0.5 * speed / (BRAKE * pusher.acceleration)  # at this speed [s]
-        there = np.array(model.moved(*map(float, pose), float(velocity[0]), float(velocity[1]), rests))
+        x, y, turn = (float(v) for v in pose)
+        there = np.array(model.moved(x, y, turn, float(velocity[0]), float(velocity[1]), rests))
         now = beyond(transform(pose, corners), self.bounds, ROOM)
         tips = np.array([hand[:2], hand[:2] + rests * velocity[:2]])
         before, after = (beyond(tip[None], self.bounds, ROOM + pusher.tip_radius) for tip in tips)

@@ -240,7 +240,7 @@ def _safe(
         run = plant.follow(pose, np.column_stack([tips, np.zeros(len(tips))]))
         if run.outcome:
             return False
-        at = transform(run.object[:, None, :], corners).reshape(-1, 2)
-        if bounds is not None and beyond(at, bounds, ROOM) > 0:
+        points = transform(run.object[:, None, :], corners).reshape(-1, 2)
+        if bounds is not None and beyond(points, bounds, ROOM) > 0:
             return False
     return True
