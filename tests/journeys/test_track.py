@@ -44,6 +44,8 @@ def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     text = capsys.readouterr().out
     assert "arrived" in text
     assert "sticking" in text
+    assert "looking" in text  # counted, but not told again for every frame
+    assert "looking at the object" not in text
     assert figure.read_bytes().lstrip().startswith(b"<")
     noisy = ("track", path, "--controller", law, "--friction", 0.35, "--seed", 3, "--json")
     assert call(*noisy, "--tolerance", "1,1") == 0

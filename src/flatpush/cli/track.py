@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 CONTROLLERS = ("path", "dfl", "horizon")
 TIMINGS = ("even", "plan")
 MOST_TOLD, MOST_NOTES = 8, 20
+# What the modes that are counted tell as well: saturated and looking.
+UNTOLD = ("friction cone allows", "looking at the object")
 
 
 def command(
@@ -283,7 +285,7 @@ def _tell(result: dict[str, Any], run: ClosedLoopRun, figure: Path | None) -> No
     typer.echo(f"off the goal by {error_text(result['distance'], result['turn'])}")
     typer.echo("controller: " + ", ".join(f"{m} {n}" for m, n in result["modes"].items()))
     typer.echo("contact: " + ", ".join(f"{m} {n}" for m, n in result["contacts"].items()))
-    told = [note for note in run.notes if "friction cone allows" not in note[1]]
+    told = [note for note in run.notes if not any(words in note[1] for words in UNTOLD)]
     told = [note for note in told if note[1].startswith("landing")] or told
     for time, text in told[:MOST_TOLD]:
         typer.echo(f"  {time:.2f} s: {text}")

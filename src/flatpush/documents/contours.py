@@ -359,8 +359,10 @@ def _check_no_frame(outer: Chain, others: list[Chain], source: str, choice: str)
     ]
     nested = [a for a in nested if not any(b is not a and b.contains(a) for b in nested)]
     if named or (nested and (alone or len(nested) == 1)):
+        inside = sorted(set().union(*(c.layers for c in others)) - {""})
+        layers = f" Inside it are contours on {', '.join(inside)}." if inside else ""
         raise InputError(
             f"the outer contour may be the frame of the sheet: {outer.place}",
             source=source,
-            hint="Choose the outline by its layer or id: outline: {file: ..., layer: NAME}.",
+            hint="Choose the outline by its layer or id: outline: {file: ..., layer: NAME}." + layers,
         )
