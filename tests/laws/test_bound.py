@@ -134,6 +134,18 @@ def test_bounds_rise_and_end_where_nothing_is_left():
     assert last.least_of_all == last.least[1]
 
 
+def test_a_plan_that_ends_in_a_corner_of_the_goal_stays_within_it():
+    """The box about the corner was halved without end, its counter ran over, and plans "found" ended beyond the goal."""
+    fleet = random_fleet(np.random.default_rng(5), "dubins", 1)
+    slack = np.array([0.0045, 0.0045, 0.08])
+    query = Query(fleet, np.array([0.1, 0.05, 1.0]), np.zeros(3), slack=slack)
+    cost = refine(query, rounds=1).cost
+    *_, last = islice(bounds(query, cost), 50)
+    assert last.complete
+    assert last.least[0] == pytest.approx(cost, rel=1e-6)
+    assert last.found is None or np.all(np.abs(last.found.poses[-1]) <= slack * (1 + 1e-9))
+
+
 @pytest.mark.slow
 def test_a_goal_that_leaves_room_costs_less():
     rng = np.random.default_rng(9)

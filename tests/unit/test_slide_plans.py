@@ -1,8 +1,6 @@
 """Plans of pushes that slide, from scene to robot: planned, proved, followed, drawn; refused where nothing turns."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +8,10 @@ import pytest
 
 import flatpush as fp
 from flatpush.control.tracking.simulated_run import TrackedRun
-from flatpush.documents import export_csv, parse_plan, plan_document, scene_document
+from flatpush.documents import export_csv, parse_plan, plan_document
+from flatpush.errors import InputError
 from flatpush.geometry import Outline, pose_error, transform
+from flatpush.planning.bound import bounded
 from flatpush.simulation.plant import Plant
 
 BRICK = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
@@ -25,6 +25,19 @@ def slippery(**changes) -> fp.Scene:
 @pytest.fixture(scope="module")
 def plan():
     return fp.plan(slippery())
+
+
+@pytest.fixture(scope="module")
+def around():
+    """Beside a post and between walls, the finger never lifted."""
+    post = [(0.035, 0.055), (0.045, 0.055), (0.045, 0.065), (0.035, 0.065)]
+    return fp.plan(
+        slippery(
+            pusher=fp.Pusher(transit="planar"),
+            workspace=fp.Workspace((-0.1, -0.1, 0.15, 0.12), (post,)),
+            planning=fp.Planning(clearance=0.001),
+        )
+    )
 
 
 def ends(plan, pose, friction=0.0, cof=None):
@@ -62,6 +75,17 @@ def test_the_document_holds_it_and_reads_back(plan):
     assert fp.verify(parse_plan(document), scene=slippery()).ok
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [{"pusher": fp.Pusher(fingers=2, spacing=0.01)}, {"planning": fp.Planning(slides="never")}],
+    ids=["two fingers", "never"],
+)
+def test_a_scene_without_slides_refuses_them(plan, changes):
+    """Also where the digest of its scene was taken out of the plan."""
+    report = fp.verify(replace(plan, scene=slippery(**changes), scene_digest=""))
+    assert [claim.name for claim in report.failed] == ["executed: slides where the scene has none"]
+
+
 def test_sensitivity_is_what_the_plant_does(plan):
     """By rollouts with other steps: a start 0.2 mm aside in any direction, 0.2° turned, friction of 0.005."""
     outline, start = plan.scene.object.outline.vertices, plan.scene.start_pose
@@ -85,6 +109,11 @@ def test_sensitivity_is_what_the_plant_does(plan):
     assert plan.certificate.sensitivity["place"] > 1.0
 
 
+def test_no_bound_is_known_of_slides(plan):
+    with pytest.raises(InputError, match="this plan's slide"):
+        next(bounded(fp.Planner(plan.scene), plan))
+
+
 def test_slides_never_leaves_it_at_no_plan():
     refused = fp.plan(slippery(planning=fp.Planning(slides="never")))
     assert refused.status == "no_plan"
@@ -99,15 +128,11 @@ def test_listed_pushes_are_kept_to():
     assert fp.plan(slippery(pushes=pushes, planning=fp.Planning(slides="join"))).slides
 
 
-def test_a_disc_that_nothing_turns_is_told(tmp_path):
-    disc = fp.Object(Outline.circle(0.03), friction=0.0)
-    asked = fp.Scene(disc, (0.05, 0.0, 0.3))
-    (tmp_path / "disc.json").write_text(json.dumps(scene_document(asked)))
-    command = [sys.executable, "-m", "flatpush", "plan", str(tmp_path / "disc.json")]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert ended.returncode == 3
-    assert "no push of this finger turns the object" in ended.stderr
-    assert "Traceback" not in ended.stderr
+def test_a_disc_that_nothing_turns_is_told():
+    asked = fp.Scene(fp.Object(Outline.circle(0.03), friction=0.0), (0.05, 0.0, 0.3))
+    refused = fp.plan(asked)
+    assert refused.status == "no_plan"
+    assert "no push of this finger turns the object" in refused.reason
     assert fp.plan(replace(asked, goal=(0.0, 0.0, "free"))).status == "solved"
 
 
@@ -126,26 +151,18 @@ def test_slides_never_make_a_plan_costlier():
     assert cheaper
 
 
-def test_one_finger_goes_around_on_the_table_and_keeps_its_clearance():
-    post = [(0.035, 0.055), (0.045, 0.055), (0.045, 0.065), (0.035, 0.065)]
-    found = fp.plan(
-        slippery(
-            pusher=fp.Pusher(transit="planar"),
-            workspace=fp.Workspace((-0.1, -0.1, 0.15, 0.12), (post,)),
-            planning=fp.Planning(clearance=0.001),
-        )
-    )
-    assert found.status == "solved"
-    assert fp.verify(found).ok
-    assert all(not s.height.any() for s in found.segments if s.kind == "transit")
-    assert found.certificate.clearance >= 0.001
+def test_one_finger_goes_around_on_the_table_and_keeps_its_clearance(around):
+    assert around.status == "solved"
+    assert fp.verify(around).ok
+    assert all(not s.height.any() for s in around.segments if s.kind == "transit")
+    assert around.certificate.clearance >= 0.001
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("transit", ["lift", "planar"])
-def test_track_looks_after_each_slide_and_arrives(transit):
+@pytest.mark.parametrize("which", ["plan", "around"])
+def test_track_looks_after_each_slide_and_arrives(which, request):
     """The finger has a friction that nobody told, the start is off and the camera is noisy."""
-    found = fp.plan(slippery(pusher=fp.Pusher(transit=transit)))
+    found = request.getfixturevalue(which)
     tracked = TrackedRun(friction=0.03, start=(0.002, -0.001, 0.05), seed=1)
     run = tracked.of(found)
     assert run.outcome == "arrived"
@@ -153,7 +170,7 @@ def test_track_looks_after_each_slide_and_arrives(transit):
     assert run.modes.count("look") >= len(found.slides)
     assert len(run.times) == len(run.object) == len(run.heights) == len(run.modes) == len(run.contacts)
     assert np.all(np.diff(run.times) >= 0)
-    if transit == "lift":  # the hand goes through its places without a jump
+    if which == "plan":  # the hand is lifted, and goes through its places without a jump
         steps = np.linalg.norm(np.diff(run.pusher[:, :2], axis=0), axis=1)
         assert np.max(steps) < 0.03
 

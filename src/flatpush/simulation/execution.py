@@ -94,6 +94,8 @@ def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
         elif isinstance(segment, SlideSegment):
             assert plant is not None
             yield from _starts(segment, pose, label)
+            never = scene.pusher.fingers != 1 or scene.planning.slides == "never"
+            yield Finding("slides where the scene has none", float(never), 0.0, "", label)
             yield from _slides(plant, segment, label)
             pose = segment.object[-1]
             hands = [segment.fingers]

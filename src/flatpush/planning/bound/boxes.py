@@ -18,6 +18,7 @@ from .legs import End, end_of, leg_bound
 
 MOST_LEGS = 3
 SIDES = 3 * MOST_LEGS  # x, y, θ of the end of every leg
+POINT = 52  # a side that was halved so often is shorter than the rounding of its middle
 LOOKED_AT = 4  # the middle of every so many boxes is tried as a plan
 
 # The search as it stands: boxes that are open, slots that were ever used, slots that are free again, boxes halved so
@@ -163,7 +164,7 @@ def _longest(chains: Chains, boxes: Boxes, slot: int) -> int:
     chain, longest, most = boxes.chain[slot], -1, 0.0
     for side in range(3 * chains.legs[chain]):
         length = chains.lever[chain, side] * chains.half[chain, side] * 0.5 ** float(boxes.level[slot, side])
-        if length > most:
+        if length > most and boxes.level[slot, side] < POINT:
             longest, most = side, length
     return longest
 

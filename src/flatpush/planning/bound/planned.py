@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import FlatpushError
+from ...errors import FlatpushError, InputError
 from ...problem import Plan
 from ...simulation import certify
 from ..assembly import assemble
@@ -32,10 +32,15 @@ def bounded(planner: "Planner", plan: Plan) -> Iterator[Plan]:
         plan: solved, with at least one push.
 
     Raises:
-        InputError: for a scene of which no bound is known; see check_bound.
+        InputError: for a scene of which no bound is known, see check_bound, and for a plan with slides.
     """
     scene = plan.scene
     check_bound(scene)
+    if plan.slides:
+        raise InputError(
+            "a bound is known for pushes that steer, but this plan's slide", key="planning.slides",
+            value=scene.planning.slides, hint="Leave out --bound.",
+        )  # fmt: skip
     goal, slack = np.nan_to_num(scene.goal_pose), scene.goal_slack
     query = Query(
         planner.fleet,
