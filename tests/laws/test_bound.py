@@ -135,7 +135,7 @@ def test_bounds_rise_and_end_where_nothing_is_left():
 
 
 def test_a_plan_that_ends_in_a_corner_of_the_goal_stays_within_it():
-    """The box about the corner was halved without end, its counter ran over, and plans "found" ended beyond the goal."""
+    """The box about the corner was halved without end, its counter ran over, and plans ended beyond the goal."""
     fleet = random_fleet(np.random.default_rng(5), "dubins", 1)
     slack = np.array([0.0045, 0.0045, 0.08])
     query = Query(fleet, np.array([0.1, 0.05, 1.0]), np.zeros(3), slack=slack)
