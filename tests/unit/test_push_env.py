@@ -203,3 +203,28 @@ def test_what_cannot_be_is_told():
         PushTask(scene(workspace=fp.Workspace((0, 0, 0.01, 0.01)))).drawn(np.random.default_rng(0))
     with pytest.raises(InputError, match="start, goal and hand"):
         made().reset(options={"begin": 1})
+
+
+def test_wrong_actions_seeds_and_options_are_told_and_move_nothing():
+    """One number was taken for both of a velocity, an int64 for no seed, and a knock put NaN in the state."""
+    import gymnasium
+
+    env = made()
+    before, _ = env.reset(seed=1)
+    for action in ([0.1], [0.1, 0.2, 0.3], 0.5, [np.nan, 0.0], "ab", []):
+        with pytest.raises(InputError, match="actions are finite numbers"):
+            env.step(action)
+    with pytest.raises(InputError, match="displacement"):
+        env.displace(np.array([np.nan, 0.0, 0.0]))
+    with pytest.raises(InputError, match="start"):
+        env.reset(options={"start": "here"})
+    assert np.array_equal(env.reset(seed=1)[0], before)
+    many = gymnasium.make_vec("flatpush/Push-v0", 2, scene=scene())
+    assert np.array_equal(many.reset(seed=np.int64(4))[0], many.reset(seed=4)[0])
+    with pytest.raises(InputError, match="one seed for each of 2"):
+        many.reset(seed=[1])
+    with pytest.raises(InputError, match="for each of 2"):
+        many.step(np.zeros((2, 1)))
+    for option in ({"noise": 3}, {"eyes": 3}, {"substeps": 1.5}, {"longest": 2.5}, {"coverage": "all"}):
+        with pytest.raises(InputError, match=next(iter(option))):
+            made(**option)

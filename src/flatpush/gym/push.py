@@ -11,6 +11,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import finite, vector
 from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Scene
@@ -22,6 +23,7 @@ Observation = NDArray[np.float32] | NDArray[np.uint8]
 Info = dict[str, Array]
 Flags = NDArray[np.bool_]
 ID = "flatpush/Push-v0"
+ACTIONS = "actions are finite numbers"
 MOST = 1e3  # of the values of a state [m]
 
 
@@ -92,7 +94,7 @@ class PushEnv(gymnasium.Env[Observation, Array]):
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, Info]:
         """One decision."""
-        reward, ended, cut = self._many.advance(np.asarray(action, dtype=float)[None])
+        reward, ended, cut = self._many.advance(finite(action, ACTIONS)[None])
         return self._many.observed()[0], float(reward[0]), bool(ended[0]), bool(cut[0]), self._info()
 
     def displace(self, displacement: Array) -> Observation:
@@ -152,8 +154,11 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, object] | None = None
     ) -> tuple[Observation, dict[str, Array]]:
         """New episodes; environment k has the seed plus k."""
-        seeds = [seed + k if isinstance(seed, int) else None for k in range(self.num_envs)]
-        for k, own in enumerate(seed if isinstance(seed, list) else seeds):
+        if not isinstance(seed, list):
+            seed = [None if seed is None else seed + k for k in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InputError(f"there is one seed for each of {self.num_envs}", key="seed", value=seed)
+        for k, own in enumerate(seed):
             if own is not None:
                 self.rngs[k] = np.random.default_rng(own)
             self.begin(k, options or {})
@@ -163,7 +168,7 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
     def step(self, actions: Array) -> tuple[Observation, Array, Flags, Flags, dict[str, Array]]:
         """A decision of each; one that had ended begins anew instead, with no reward."""
         again = np.flatnonzero(self._done)
-        reward, ended, cut = self.advance(np.asarray(actions, dtype=float), resting=self._done)
+        reward, ended, cut = self.advance(finite(actions, ACTIONS), resting=self._done)
         for k in again.tolist():
             self.begin(k, {})
         reward[again], ended[again], cut[again] = 0.0, False, False
@@ -198,8 +203,9 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Rewards, and which episodes have ended or are cut short, each (n,), after actions (n, 2 or 3)."""
         task, size = self.task, self.task.scene.object.outline.size
-        if not np.isfinite(actions).all():
-            raise InputError("actions are finite numbers", value=actions)
+        shape = (self.num_envs, *task.limits.shape)
+        if actions.shape != shape:
+            raise InputError(f"{ACTIONS}, shape {shape[1:]} for each of {shape[0]}", value=actions)
         hands = task.moved(self.hand, actions)
         if resting is not None:
             hands[resting] = self.hand[resting, None]
@@ -225,7 +231,7 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
 
     def knock(self, k: int, displacement: Array) -> None:
         """Moves the object of one environment by (x, y, θ), shape (3,) [m, m, rad]."""
-        self.object[k] += displacement
+        self.object[k] += _pose(displacement, "displacement")
         self._frames[k] = self._seen(self.object[k], self.rngs[k])
         self._far[k] = self.task.farthest(self.object[k], self.goal[k])
 
@@ -274,7 +280,4 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
 
 
 def _pose(value: object, name: str) -> Array:
-    pose = np.array(value, dtype=float)
-    if pose.shape != (3,) or not np.isfinite(pose).all():
-        raise InputError("a pose is three finite numbers", key=name, value=value)
-    return pose
+    return vector(value, 3, f"the {name} is three finite numbers")

@@ -91,7 +91,11 @@ class PushTask:
             raise InputError("a task has a goal with an angle", key="goal", value="free")
         if self.success not in ("pose", "coverage"):
             raise InputError("success is pose or coverage", key="success", value=self.success)
-        if not 0 < self.coverage <= 1:
+        for name, of in (("noise", Noise | None), ("eyes", Eyes), ("substeps", int), ("longest", int)):
+            if not isinstance(getattr(self, name), of):
+                what = "a whole number" if of is int else "fp.Noise or None" if name == "noise" else "Eyes"
+                raise InputError(f"{name} is {what}", key=name, value=getattr(self, name))
+        if not (is_finite(self.coverage) and 0 < self.coverage <= 1):
             raise InputError("a coverage is above 0 and at most 1", key="coverage", value=self.coverage)
         for name, least in (("rate", 0.0), ("substeps", 1), ("longest", 1)):
             value = getattr(self, name)
