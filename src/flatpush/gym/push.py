@@ -184,7 +184,7 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
         if unknown := sorted(set(options) - {"start", "goal", "hand"}):
             raise InputError("options of a reset are start, goal and hand", value=unknown)
         scene, hand = self.task.drawn(self.rngs[k])
-        given = {name: _pose(value, name) for name, value in options.items()}
+        given = {name: _pose(value, name) for name, value in options.items()}  # type: ignore[arg-type]  # checked there
         self.object[k], self.goal[k] = (
             given.get("start", scene.start_pose),
             given.get("goal", scene.goal_pose),
@@ -279,5 +279,5 @@ class PushVectorEnv(VectorEnv[Observation, Array, Array]):
         return pose + rng.standard_normal(3) * [eyes.position, eyes.position, eyes.angle]
 
 
-def _pose(value: object, name: str) -> Array:
+def _pose(value: ArrayLike, name: str) -> Array:
     return vector(value, 3, f"the {name} is three finite numbers")
