@@ -78,7 +78,13 @@ def test_pictures_of_a_sheet_make_a_camera_file(tmp_path, flatpush):
     status, _, error = flatpush("camera", "calibrate", *names[:2], *said, "-o", tmp_path / "other.json")
     assert status == 2
     assert "2 of 2 pictures show the target, and 3 or more" in error
+    same = [names[1]] * 4 + names[:1]
+    status, _, error = flatpush("camera", "calibrate", *same, *said, "-o", tmp_path / "other.json")
+    assert status == 2
+    assert "only 2 of 5 pictures differ" in error
     assert not (tmp_path / "other.json").exists()
+    board = ("--board", "9x6,1e300", "-o", tmp_path / "other.json")
+    assert "fields of 0.1 to 1000 mm" in flatpush("camera", "calibrate", *names, *board)[2]
 
 
 def test_watch_prints_poses_and_writes_a_log_that_identify_reads(folder, tmp_path, flatpush):
@@ -112,6 +118,7 @@ def test_bad_input_is_one_line(folder, tmp_path, flatpush):
     for arguments, says in (
         ([*pictures(folder), *camera, "--tag", "3,25,20"], "picture 1: tag 3 looks 30"),
         ([str(tmp_path / f"m{k}.png") for k in range(3)] + [*camera, "--tag", OBJECT], "mirrored"),
+        ([*pictures(folder, 1), *camera, "--tag", "3,30,20,1e300,0,0"], "at most 100 m"),
         ([str(tmp_path / "broken.png"), *camera, "--tag", OBJECT], "broken.png: this file holds no picture"),
         ([*pictures(folder), *camera, "--tag", OBJECT, "--finger", "3,20,50"], "two objects have one tag"),
         ([*pictures(folder), "--camera", str(folder / "0.png"), "--tag", OBJECT], "not text"),

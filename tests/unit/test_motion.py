@@ -9,7 +9,7 @@ import yaml
 
 import flatpush as fp
 from flatpush.cli.app import main
-from flatpush.documents import load_motions
+from flatpush.documents import columns_of_scene, load_motions, load_robot_log
 from flatpush.documents.motion_file import Motion, is_motion_file, own_or_plain
 from flatpush.errors import InputError
 from flatpush.friction import Support
@@ -245,8 +245,6 @@ def test_from_a_log_with_names_of_its_own_to_a_scene(tmp_path, scene, run):
 
 
 def test_a_scene_gives_names_and_units_of_its_recordings_once(tmp_path, scene, run):
-    from flatpush.documents import columns_of_scene, load_motions
-
     motions = pushed(pushes=PUSHES[:2])
     log = written(motions, tmp_path / "log.csv", "stamp,ox,oy,yaw,tip_x,tip_y,try")
     assert columns_of_scene(scene) is None
@@ -267,7 +265,6 @@ def test_a_scene_gives_names_and_units_of_its_recordings_once(tmp_path, scene, r
 
 def test_a_run_under_feedback_is_logged_as_a_robots(tmp_path):
     from flatpush.control import ClosedLoopRun
-    from flatpush.documents import load_robot_log
     from flatpush.documents.motion_file import load_motions
     from flatpush.execution.log import save_followed
 
@@ -416,6 +413,25 @@ def test_a_column_fx_makes_no_wrench(tmp_path, scene, run):
     status, _, err = run(log, "--scene", scene)
     assert status == 2
     assert "line 2: py is not a number" in err
+
+
+@pytest.mark.parametrize(
+    ("columns", "row", "words"),
+    [
+        ("{x: [1]}", "0,0,0,0,0,0", "logs.columns.x: the name of a column is a text"),
+        ("{x: y}", "0,0,0,0,0,0", "column y stands for two things, x and y"),
+        ("{}", "0,1e300,0,0,0,0", "line 2: x is beyond"),
+    ],
+)
+def test_names_and_numbers_that_make_no_sense_are_told(tmp_path, scene, run, columns, row, words):
+    log = tmp_path / "log.csv"
+    log.write_text(f"t,x,y,theta,px,py\n{row}\n")
+    scene.write_text(SCENE + f"logs: {{columns: {columns}}}\n")
+    status, _, err = run(log, "--scene", scene)
+    assert status == 2
+    assert words in err
+    with pytest.raises(InputError):
+        load_robot_log(log, columns=columns_of_scene(scene)[0])
 
 
 def test_our_own_logs_are_read_in_spite_of_the_names_that_a_scene_gives(tmp_path, scene):

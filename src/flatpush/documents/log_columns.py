@@ -49,20 +49,29 @@ def columns_of_scene(scene: str | os.PathLike[str]) -> tuple[dict[str, str], str
     gives none.
 
     Raises:
-        InputError: for a role that there is not.
+        InputError: for a role that there is not, or a name that is no text.
     """
     logs = read_mapping(scene).get("logs")
     if not isinstance(logs, dict):
         return None
-    columns = dict(logs.get("columns") or {})
-    for role in columns:
+    columns = logs.get("columns") or {}
+    if not isinstance(columns, dict):
+        raise InputError("columns are named as role: name", source=os.fspath(scene), key="logs.columns")
+    for role, name in columns.items():
+        if not isinstance(name, str):
+            raise InputError(
+                "the name of a column is a text",
+                source=os.fspath(scene),
+                key=f"logs.columns.{role}",
+                value=name,
+            )
         if role not in _ALL:
             raise InputError(
                 f"columns have the roles {', '.join(_ALL)}",
                 source=os.fspath(scene),
                 key=f"logs.columns.{role}",
             )
-    return columns, str(logs.get("length", "m")), str(logs.get("angle", "rad"))
+    return dict(columns), str(logs.get("length", "m")), str(logs.get("angle", "rad"))
 
 
 def bare(name: str) -> str:
@@ -117,6 +126,11 @@ def columns(
         if unit not in scale:
             raise InputError(
                 f"column {bare(names[k])} has a unit among {', '.join(scale)}", source=source, value=stated
+            )
+        if k in places:
+            raise InputError(
+                f"column {bare(names[k])} stands for two things, {list(roles)[places.index(k)]} and {role}",
+                source=source,
             )
         places.append(k)
         factors.append(scale[unit])

@@ -18,6 +18,7 @@ from .pairs_file import PLAIN, RECORDED, csv_lines
 from .reading import read_text
 from .robot_log import RAW, load_robot_log
 from .rows import BadRow, Unusable, is_number, number, refusal
+from .scene_model import LARGEST
 
 MOST_BYTES = 100_000_000
 # A recording ends where rows are missing for so long, or the finger is suddenly elsewhere [s, m].
@@ -162,7 +163,10 @@ def _values(cells: Sequence[str], places: Sequence[int], width: int) -> list[flo
         raise Unusable(f"it has {len(cells)} of {width} columns")
     if all(not cells[k].strip() or cells[k].strip().lower() == "nan" for k in places[1:4]):
         return None
-    return [number(cells[k], role) for role, k in zip(ROLES, places, strict=True)]
+    return [
+        number(cells[k], role, math.inf if role == "t" else LARGEST)
+        for role, k in zip(ROLES, places, strict=True)
+    ]
 
 
 def _parts(name: str, table: Array, lines: np.ndarray) -> list[Motion]:

@@ -191,10 +191,7 @@ def _values(cells: Sequence[str], columns: _Columns) -> np.ndarray:
 
 
 def _number(cell: str, name: str) -> float:
-    value = number(cell, name)
-    if abs(value) > LARGEST:
-        raise Unusable(f"{name} is beyond {LARGEST:g} ({cell.strip()})")
-    return value
+    return number(cell, name, LARGEST)
 
 
 def _rising(cell: str, line: int, name: str, last: dict[str, tuple[float, int]]) -> None:

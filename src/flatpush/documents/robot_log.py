@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from .log_columns import ROLES, RUNS, TURN, bare, column, holds
 from .log_columns import columns as columns_of
 from .reading import read_text
 from .rows import BadRow, Unusable, is_number, number, refusal
+from .scene_model import LARGEST
 
 # In the order of a raw row; lengths in mm, angles in rad.
 RAW = (
@@ -241,7 +243,9 @@ class _Layout:
         pose = [cells[k].strip().lower() for k in self.places[1:4] if k is not None]
         unseen = self.own and all(text in ("", "nan") for text in pose)
         values = [
-            0.0 if k is None or (unseen and 1 <= j <= 3) else factor * number(cells[k], bare(self.names[k]))
+            0.0
+            if k is None or (unseen and 1 <= j <= 3)
+            else factor * number(cells[k], bare(self.names[k]), LARGEST if 1 <= j <= 6 else math.inf)
             for j, (k, factor) in enumerate(zip(self.places, self.factors, strict=True))
         ]
         action = self.places[-1]

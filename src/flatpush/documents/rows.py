@@ -26,8 +26,8 @@ class Unusable(Exception):
     """Why a row is left out."""
 
 
-def number(cell: str, name: str) -> float:
-    """The finite number in a cell of a column; Unusable if it holds none."""
+def number(cell: str, name: str, most: float = math.inf) -> float:
+    """The finite number in a cell of a column, at most so large; Unusable if it holds none."""
     text = cell.strip()
     try:
         value = float(text)
@@ -35,6 +35,8 @@ def number(cell: str, name: str) -> float:
         raise Unusable(f"{name} is not a number ({text[:20]!r})") from None
     if not math.isfinite(value):
         raise Unusable(f"{name} is not finite ({text})")
+    if abs(value) > most:
+        raise Unusable(f"{name} is beyond {most:g} ({text})")
     return value
 
 

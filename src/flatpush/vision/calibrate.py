@@ -17,6 +17,10 @@ from .worn import Tag
 FEW, VAGUE = 3, 0.01
 # A view is refused whose points are this far from their places, root mean square [px].
 WRONG = 2.0
+# A view tells nothing new whose points are all within this of those of an earlier one [px].
+ALIKE = 3.0
+# Sides of a board's fields [m].
+FIELDS = (1e-4, 1.0)
 # Points that a view needs.
 POINTS = 8
 
@@ -34,9 +38,9 @@ class Board:
     square: float
 
     def __post_init__(self) -> None:
-        if min(self.columns, self.rows) < 3 or not (np.isfinite(self.square) and self.square > 0):
+        if min(self.columns, self.rows) < 3 or not FIELDS[0] <= self.square <= FIELDS[1]:
             raise InputError(
-                "a board has 3 × 3 inner corners or more, and fields of a size", key="board",
+                "a board has 3 × 3 inner corners or more, and fields of 0.1 to 1000 mm", key="board",
                 value=f"{self.columns}x{self.rows},{1000 * self.square:g}",
             )  # fmt: skip
 
@@ -170,6 +174,13 @@ def calibrate(
             f"{len(views)} of {len(pictures)} pictures show the target, and {FEW} or more are needed",
             hint="Hold it at different tilts, up to the corners of the picture.",
         )
+    different = [k for k, view in enumerate(views) if not any(_alike(view, other) for other in views[:k])]
+    if len(different) < FEW:
+        raise InputError(
+            f"only {len(different)} of {len(views)} pictures differ, and {FEW} or more are needed",
+            value=", ".join(name for k, name in enumerate(names) if k not in different),
+            hint="Hold the target at different tilts, up to the corners of the picture.",
+        )
     flat = [np.column_stack([p, np.zeros(len(p))]).astype(np.float32) for _, p in views]
     pixels = [np.ascontiguousarray(u, dtype=np.float32).reshape(-1, 1, 2) for u, _ in views]
     rms, K, lens, *_, sd, _, each = cv2.calibrateCameraExtended(flat, pixels, (w, h), None, None)
@@ -202,3 +213,8 @@ def calibrate(
         len(views),
         tuple(unseen),
     )
+
+
+def _alike(a: tuple[Array, Array], b: tuple[Array, Array]) -> bool:
+    """Whether two views show the same points at the same places of the picture."""
+    return bool(np.array_equal(a[1], b[1]) and np.max(np.abs(a[0] - b[0])) < ALIKE)

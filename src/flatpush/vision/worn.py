@@ -7,6 +7,9 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.pose import Array
 
+# A tag is nowhere farther from the origin of its object than this [m]; its angle may be as many radians.
+FAR = 100.0
+
 
 @dataclass(frozen=True, eq=False)
 class Tag:
@@ -32,5 +35,7 @@ class Tag:
             raise InputError(
                 "the height of a tag over the table is 0 or more", key="tag.height", value=self.height
             )
-        if pose.shape != (3,) or not np.all(np.isfinite(pose)):
-            raise InputError("the pose of a tag is x, y and an angle", key="tag.pose", value=pose)
+        if pose.shape != (3,) or not np.all(np.abs(pose) <= FAR):
+            raise InputError(
+                "the pose of a tag is x, y (at most 100 m) and an angle", key="tag.pose", value=pose
+            )
