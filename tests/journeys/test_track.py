@@ -71,6 +71,7 @@ def test_what_makes_no_sense_is_refused(plan):
         ("--rate", "0", "rate is positive"),
         ("--controller", "pid", "path, dfl, horizon"),
         ("--noise", "-1,0", "0 or more"),
+        ("--tolerance", "0,1", "both positive"),
         ("--camera", "0", "camera is positive"),
         ("--friction", "-0.1", "0 or more"),
         ("--timing", "late", "even, plan"),

@@ -121,6 +121,10 @@ def command(
     if friction is not None and not (math.isfinite(friction) and friction >= 0):
         raise InputError("friction is a finite number, 0 or more", key="--friction", value=friction)
     within = None if tolerance is None else numbers(tolerance, 2, "--tolerance")
+    if within is not None and min(within) <= 0:
+        raise InputError(
+            "a tolerance is a distance and an angle, both positive", key="--tolerance", value=tolerance
+        )
     spread, shift, off = (
         numbers(noise, 2, "--noise") or [],
         numbers(centre, 2, "--centre") or [],

@@ -118,7 +118,8 @@ def columns(
     Raises:
         InputError: for a column that is missing or twice there, or of an unknown unit.
     """
-    places, factors = [], []
+    places: list[int] = []
+    factors: list[float] = []
     for role in roles:
         k, stated = column(names, role, own, source)
         scale = {"t": _SECONDS, "theta": _RADIANS, TURN: _RADIANS}.get(role, _METRES)
