@@ -141,6 +141,29 @@ def test_what_is_no_data_set_of_ours_is_left_alone(tmp_path):
         demonstrations.check_scenes([replace(SCENE, pusher=fp.Pusher(fingers=2, spacing=0.018))])
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"total_episodes": "5"},
+        {"total_frames": -1},
+        {"flatpush": {"seed": 0, "blocks": 1, "files": 1, "sums": []}},
+    ],
+)
+def test_counts_that_are_none_are_refused(tmp_path, changed):
+    """They ended with a traceback, or after the first block had been made."""
+    lerobot.LeRobotFolder(tmp_path / "set", 0).add(made_up([3], np.random.default_rng(1)), 1)
+    info = tmp_path / "set" / "meta" / "info.json"
+    info.write_text(json.dumps(json.loads(info.read_text()) | changed))
+    with pytest.raises(InputError, match="no data set that flatpush wrote"):
+        lerobot.LeRobotFolder(tmp_path / "set", 0)
+
+
+def test_a_folder_that_cannot_be_made_is_told_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="file"):
+        lerobot.LeRobotFolder(tmp_path / "file" / "set", 0)
+
+
 def test_a_replay_notices_another_action_and_another_end():
     env = PushEnv(PushTask(SCENE, random=False))
     options = {"seed": 3}

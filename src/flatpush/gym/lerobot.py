@@ -57,6 +57,7 @@ class LeRobotFolder:
             self._go_on(info)
         elif folder.exists() and any(folder.iterdir()):
             raise InputError("this folder holds something else", source=str(folder), hint="Choose another.")
+        folder.mkdir(parents=True, exist_ok=True)  # fails before the work begins, not after
 
     def add(self, block: Block, most: int) -> None:
         """Writes the episodes of a block, so many at most, then counts them."""
@@ -84,7 +85,10 @@ class LeRobotFolder:
             self.episodes, self.frames = known["total_episodes"], known["total_frames"]
             self.blocks, self.files, seed = own["blocks"], own["files"], own["seed"]
             self._sums = {name: [np.array(row) for row in rows] for name, rows in own["sums"].items()}
-        except (ValueError, KeyError, TypeError) as error:
+            for number in (self.episodes, self.frames, self.blocks, self.files):
+                if not (isinstance(number, int) and number >= 0):
+                    raise ValueError(f"{number} counts nothing")
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError("this is no data set that flatpush wrote", source=str(info)) from error
         if seed != self.seed:
             raise InputError(
