@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush.cli import main
 from flatpush.control.tracking.simulated_run import TrackedRun
 from flatpush.documents import export_csv, parse_plan, plan_document
 from flatpush.errors import InputError
@@ -193,3 +194,18 @@ def test_a_robot_gets_the_slides(plan, tmp_path):
     last = plan.slides[-1].pusher[-1]
     assert np.min(np.linalg.norm(table[:, 1:3] - last[:2], axis=1)) < 1e-9
     assert table[-1, 0] == pytest.approx(plan.duration)
+
+
+def test_many_runs_of_slides_do_not_say_that_they_stuck(plan, tmp_path, monkeypatch, capsys):
+    """They said: stayed sticking 100.0 %."""
+    plan.save(tmp_path / "plan.json")
+    figure = tmp_path / "tube.svg"
+    words = ["flatpush", "simulate", str(tmp_path / "plan.json"), "--runs", "3", "--figure", str(figure)]
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0
+    told = capsys.readouterr().out + figure.read_text()
+    assert "3 runs" in told
+    assert "off the goal in the median" in told
+    assert "stayed sticking" not in told

@@ -280,7 +280,8 @@ def _tell(found: Any) -> None:
     typer.echo(
         f"off the goal: median {error_text(*np.median(errors, axis=0))}, worst {error_text(*np.max(errors, axis=0))}"
     )
-    typer.echo(f"stayed sticking: {100 * found.sticking_share:.1f} %")
+    if found.plan.pushes:  # slides never stick
+        typer.echo(f"stayed sticking: {100 * found.sticking_share:.1f} %")
     typer.echo(f"mean final pose {pose_text(found.mean)}")
     typer.echo(
         f"standard deviations {1000 * deviations[0]:.3f} mm, {1000 * deviations[1]:.3f} mm,"

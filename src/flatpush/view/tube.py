@@ -247,10 +247,8 @@ def _table_box(runs: Runs, box: Box) -> Box:
 
 def _subtitle(runs: Runs) -> str:
     distance, turn = np.quantile(runs.errors, 0.5, axis=0)
-    return (
-        f"off the goal in the median {_small(MM * distance)} mm and {_small(np.degrees(turn))}°;"
-        f" stayed sticking in {100 * runs.sticking_share:.1f} % of the runs"
-    )
+    stuck = f"; stayed sticking in {100 * runs.sticking_share:.1f} % of the runs" if runs.plan.pushes else ""
+    return f"off the goal in the median {_small(MM * distance)} mm and {_small(np.degrees(turn))}°{stuck}"
 
 
 def _small(value: float) -> str:
