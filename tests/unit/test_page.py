@@ -474,7 +474,7 @@ def test_a_log_of_a_run_is_played_as_it_was(short, tmp_path, ending):
 
 def test_a_log_needs_the_scene_of_its_object(tmp_path):
     log, scene = tmp_path / "run.csv", EXAMPLES / "triangle.yaml"
-    log.write_text("t\n", encoding="utf-8")
+    log.write_text("t,obj_y_mm\n", encoding="utf-8")
     for file, of, said in (
         (log, None, "Give its scene or its plan: --scene FILE"),
         (log, scene, "line 1 names no column obj_x_mm"),
