@@ -49,8 +49,9 @@ def test_the_tool_follows_and_rests_and_its_end_is_noticed():
         ended = swing(robot, 60, width=0.01)
         assert ended.outcome == DONE
         poses = np.array([cycle.state.pose for cycle in ended.cycles])
-        assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=2e-4)
-        assert np.ptp(poses[:, 3]) == pytest.approx(0.1, abs=2e-3)
+        # A cycle that comes late on a busy machine may miss the turn of the swing: three of 60 cost 1.2 % on each side.
+        assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=3e-4)
+        assert np.ptp(poses[:, 3]) == pytest.approx(0.1, abs=3e-3)
         assert ended.off < 3e-4
         rests = robot.state().pose
         robot.clock.wait(robot.time + 0.1)
