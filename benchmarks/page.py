@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,22 @@ def spent(server: subprocess.Popen[str]) -> float:
     return ticks / os.sysconf("SC_CLK_TCK")
 
 
+def stroke(browser: webdriver.Chrome, moves: int, place: Callable[[int], tuple[float, float]]) -> None:
+    """Presses the pointer, moves it from place to place at 60 moves a second, and lets go."""
+
+    def mouse(kind: str, k: int) -> None:
+        x, y = place(k)
+        event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}
+        browser.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+
+    mouse("mousePressed", 0)
+    began = time.perf_counter()
+    for k in range(1, moves + 1):
+        time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
+        mouse("mouseMoved", k)
+    mouse("mouseReleased", moves)
+
+
 def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
     """Times from a step that is asked for to the object that has moved [ms], while the pointer pushes it at 60 Hz."""
     browser.execute_script("document.getElementById('push').click(); flatpush.hand.frames.length = 0;")
@@ -90,22 +107,10 @@ def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
         "return [b.x, b.y, b.width, b.height];"
     )
 
-    def mouse(kind: str, k: int) -> None:
-        event = {
-            "type": kind,
-            "x": x - 20 + 60 * k / moves,
-            "y": y + high / 2,
-            "button": "left",
-            "buttons": 1,
-        }
-        browser.execute_cdp_cmd("Input.dispatchMouseEvent", {**event, "clickCount": 1})
+    def place(k: int) -> tuple[float, float]:
+        return x - 20 + 60 * k / moves, y + high / 2
 
-    mouse("mousePressed", 0)
-    began = time.perf_counter()
-    for k in range(1, moves + 1):
-        time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
-        mouse("mouseMoved", k)
-    mouse("mouseReleased", moves)
+    stroke(browser, moves, place)
     times = [float(v) for v in browser.execute_script("return flatpush.hand.frames")]
     browser.execute_script("document.getElementById('push').click();")
     return times
@@ -122,24 +127,12 @@ def dragged(
         f"#{thing} .body",
     )
 
-    def mouse(kind: str, k: int) -> None:
+    def place(k: int) -> tuple[float, float]:
         angle = 2 * np.pi * k / max(moves, 1)
-        event = {
-            "type": kind,
-            "x": x + 40 * np.sin(angle),
-            "y": y + 20 * np.sin(2 * angle),
-            "button": "left",
-            "buttons": 1,
-        }
-        browser.execute_cdp_cmd("Input.dispatchMouseEvent", {**event, "clickCount": 1})
+        return x + 40 * np.sin(angle), y + 20 * np.sin(2 * angle)
 
     browser.execute_script("flatpush.latencies.length = 0")
-    mouse("mousePressed", 0)
-    began = time.perf_counter()
-    for k in range(1, moves + 1):
-        time.sleep(max(0.0, began + k / 60 - time.perf_counter()))
-        mouse("mouseMoved", k)
-    mouse("mouseReleased", moves)
+    stroke(browser, moves, place)
     cpu = spent(server) - cpu
     wait(browser, "!flatpush.busy")
     return [float(v) for v in browser.execute_script("return flatpush.latencies")], cpu

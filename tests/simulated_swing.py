@@ -1,9 +1,17 @@
 """A motion that tests send to robots: aside and back, smoothly."""
 
+from itertools import count
+
 import numpy as np
 
 from flatpush.execution.course import Course
 from flatpush.execution.run import Played, stream
+
+
+def after(cycles, act):
+    """What is to be told each cycle, so that something happens in the one of this number."""
+    numbers = count(1)
+    return lambda cycle: act() if next(numbers) == cycles else None
 
 
 def swing(robot, cycles, told=None, width=0.02):

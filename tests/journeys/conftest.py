@@ -3,6 +3,15 @@
 import shutil
 
 import pytest
+from tests.live_server import EXAMPLES, Served
+
+
+@pytest.fixture(scope="module")
+def server():
+    """flatpush view of an example."""
+    found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
+    yield found
+    found.stop()
 
 
 @pytest.fixture(scope="module")

@@ -9,20 +9,13 @@ import time
 
 import numpy as np
 import pytest
-from tests.live_server import EXAMPLES, PATIENCE, Served
+from tests.live_server import PATIENCE, Served
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
 pytest.importorskip("starlette", reason="the server is in the extra `page`")
 
 DESK, TABLET = (1280, 720), (820, 1180)
-
-
-@pytest.fixture(scope="module")
-def server():
-    found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
-    yield found
-    found.stop()
 
 
 @pytest.fixture

@@ -9,18 +9,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from tests.live_server import COMMAND, EXAMPLES, PATIENCE, Served
+from tests.live_server import COMMAND, PATIENCE, Served
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
 pytest.importorskip("starlette", reason="the server is in the extra `page`")
-
-
-@pytest.fixture(scope="module")
-def server():
-    found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
-    yield found
-    found.stop()
 
 
 @pytest.fixture

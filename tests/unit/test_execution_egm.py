@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController, conforms
-from tests.simulated_swing import swing
+from tests.simulated_swing import after, swing
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
@@ -41,14 +41,10 @@ def robot_at(port, **more):
     return EgmRobot("127.0.0.1", port, **{"silence": SILENCE, "connect": SILENCE} | more)
 
 
-def moved(controller, robot, cycles, told=None):
-    return swing(robot, cycles, told)
-
-
 @pytest.mark.parametrize("cycles", [500, pytest.param(15000, marks=pytest.mark.slow)])
 def test_every_cycle_is_answered(cycles):
     with Controller() as controller, robot_at(controller.port) as robot:
-        ended = moved(controller, robot, cycles)
+        ended = swing(robot, cycles)
         seen = controller.asked()
     assert ended.outcome == DONE
     assert seen["answered"] >= cycles
@@ -78,20 +74,12 @@ def test_poses_go_through_the_base_frame():
 
 def test_a_controller_that_is_killed_or_freezes_ends_the_run():
     with Controller() as controller, robot_at(controller.port, silence=0.5) as robot:
-        count = 0
-
-        def told(cycle):
-            nonlocal count
-            count += 1
-            if count == 100:
-                controller.process.kill()
-
-        ended = moved(controller, robot, 500, told)
+        ended = swing(robot, 500, after(100, controller.process.kill))
         robot.stop()
     assert "silent for 0.5 s" in ended.outcome
     assert 99 <= len(ended.cycles) <= 102
     with Controller("--freeze", 100) as controller, robot_at(controller.port, silence=0.5) as robot:
-        ended = moved(controller, robot, 500)
+        ended = swing(robot, 500)
     assert "silent for 0.5 s" in ended.outcome
     assert 99 <= len(ended.cycles) <= 101
 
@@ -102,7 +90,7 @@ sys.path.insert(0, sys.argv[2])
 from tests.unit.test_execution_egm import moved, robot_at
 with robot_at(int(sys.argv[1])) as robot:
     print("ready", flush=True)
-    moved(None, robot, 100000)
+    swing(robot, 100000)
 """
 
 
@@ -143,7 +131,7 @@ def test_messages_that_have_waited_are_passed_over():
             time.sleep(0.001)
         robot.clock.now()
         assert robot.time - begun >= 0.08
-        ended = moved(controller, robot, 500, lambda cycle: time.sleep(0.3 * (cycle.time > 0.1)))
+        ended = swing(robot, 500, lambda cycle: time.sleep(0.3 * (cycle.time > 0.1)))
     assert "late" in ended.outcome or "RAPID is not running" in ended.outcome
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController, conforms
-from tests.simulated_swing import swing
+from tests.simulated_swing import after, swing
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
@@ -46,25 +46,17 @@ def test_the_tool_follows_and_rests_and_its_end_is_noticed():
     with Controller() as controller, robot_at(controller.host, silence=2.0) as robot:
         assert np.allclose(robot.state().pose, HOME, atol=2e-5)
         assert np.allclose(controller.asked()["q"], ARM.joints(HOME), atol=1e-4)
-        ended = swing(robot, 60, width=0.01)
+        # Slow enough: it turns 0.0015 rad too far whatever the load; in half the time 0.0019, more if cycles are late.
+        ended = swing(robot, 120, width=0.01)
         assert ended.outcome == DONE
         poses = np.array([cycle.state.pose for cycle in ended.cycles])
-        # A cycle that comes late on a busy machine may miss the turn of the swing: three of 60 cost 1.2 % on each side.
-        assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=3e-4)
-        assert np.ptp(poses[:, 3]) == pytest.approx(0.1, abs=3e-3)
+        assert np.ptp(poses[:, 0]) == pytest.approx(0.01, abs=2e-4)
+        assert np.ptp(poses[:, 3]) == pytest.approx(0.1, abs=2e-3)
         assert ended.off < 3e-4
         rests = robot.state().pose
         robot.clock.wait(robot.time + 0.1)
         assert np.allclose(robot.state().pose, rests, atol=5e-5)
-        count = 0
-
-        def told(cycle):
-            nonlocal count
-            count += 1
-            if count == 20:
-                controller.process.send_signal(signal.SIGKILL)
-
-        ended = swing(robot, 60, told, width=0.01)
+        ended = swing(robot, 60, after(20, controller.process.kill), width=0.01)
         robot.stop()
     assert "lost" in ended.outcome or "silent" in ended.outcome or "ended the motion" in ended.outcome
     assert 20 <= len(ended.cycles) <= 31
@@ -90,15 +82,8 @@ def test_a_velocity_that_is_not_renewed_ends_after_a_tenth_of_a_second():
 def test_a_robot_that_freezes_ends_the_run_and_does_not_go_on_afterwards():
     """Its time stands still as well: once it goes on, it stops within a tenth of a second of its own time."""
     with Controller() as controller, robot_at(controller.host, silence=2.0) as robot:
-        count = 0
-
-        def told(cycle):
-            nonlocal count
-            count += 1
-            if count == 30:
-                controller.process.send_signal(signal.SIGSTOP)
-
-        ended = swing(robot, 120, told, width=0.05)
+        freeze = after(30, lambda: controller.process.send_signal(signal.SIGSTOP))
+        ended = swing(robot, 120, freeze, width=0.05)
         assert ended.outcome != DONE
         assert 30 <= len(ended.cycles) <= 41
         robot.stop()
