@@ -14,6 +14,8 @@ collect_ignore_glob = ["*_controller.py"]  # programs of their own that tests st
 
 # MuJoCo asks for it when it is first imported, by whichever test; pictures of the cell need no display then.
 os.environ.setdefault("MUJOCO_GL", "egl")
+# Of pytest-timeout: a test that waits for ever fails instead [s].
+os.environ.setdefault("PYTEST_TIMEOUT", "600")
 
 # The same draws in every run.
 settings.register_profile("same draws", derandomize=True)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from flatpush.testing import check_robot
@@ -24,6 +25,14 @@ class SimulatedController:
         self.process.stdin.write("\n")
         self.process.stdin.flush()
         return json.loads(self.process.stdout.readline())
+
+    def until(self, seen, patience=60.0):
+        """What it saw when that became what is waited for; an error after some time [s]."""
+        due = time.monotonic() + patience
+        while not seen(told := self.asked()):
+            assert time.monotonic() < due, f"waited for {patience} s; the controller saw {told}"
+            time.sleep(0.01)
+        return told
 
     def __enter__(self):
         return self

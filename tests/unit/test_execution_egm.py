@@ -87,9 +87,8 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
 CLIENT = """
 import sys
 sys.path.insert(0, sys.argv[2])
-from tests.unit.test_execution_egm import moved, robot_at
+from tests.unit.test_execution_egm import robot_at, swing
 with robot_at(int(sys.argv[1])) as robot:
-    print("ready", flush=True)
     swing(robot, 100000)
 """
 
@@ -101,20 +100,16 @@ def test_the_arm_stops_within_25_cycles_when_this_side_is_killed_or_freezes(how)
 
     with Controller("--patience", 0.2) as controller:
         words = [sys.executable, "-c", CLIENT, str(controller.port), str(SCRIPT.parents[1])]
-        client = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
+        client = subprocess.Popen(words, env=dict(os.environ))
         try:
-            client.stdout.readline()
-            while controller.asked()["answered"] < 100:
-                time.sleep(0.01)
+            controller.until(lambda told: told["answered"] >= 100)
             client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-            while (seen := controller.asked())["stopped"] < 0:
-                time.sleep(0.05)
+            seen = controller.until(lambda told: told["stopped"] >= 0)
             time.sleep(0.3)
             later = controller.asked()
         finally:
             client.kill()
             client.wait()
-            client.stdout.close()
     # 25 cycles of 4 ms are 100 ms; after them the arm stays where it is.
     assert seen["worst"] == 25
     assert later["farthest"] < 1e-9
@@ -127,8 +122,7 @@ def test_messages_that_have_waited_are_passed_over():
         robot.receive()
         robot.stop()
         begun = robot.time
-        while controller.asked()["worst"] < 20:
-            time.sleep(0.001)
+        controller.until(lambda told: told["worst"] >= 20)
         robot.clock.now()
         assert robot.time - begun >= 0.08
         ended = swing(robot, 500, lambda cycle: time.sleep(0.3 * (cycle.time > 0.1)))

@@ -107,11 +107,9 @@ def test_the_watchdog_stops_the_arm_when_this_side_is_killed_or_freezes(how):
         words = [sys.executable, "-c", CLIENT, controller.host, str(Path(__file__).parents[2])]
         client = subprocess.Popen(words, env=dict(os.environ))
         try:
-            while controller.asked()["commands"] < 100:
-                time.sleep(0.01)
+            controller.until(lambda told: told["commands"] >= 100)
             client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-            while (seen := controller.asked())["fired"] < 0:
-                time.sleep(0.05)
+            seen = controller.until(lambda told: told["fired"] >= 0)
             time.sleep(0.3)
             later = controller.asked()
         finally:
