@@ -6,20 +6,24 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from contextlib import ExitStack
 from pathlib import Path
+
+from tests.waiting import started
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 COMMAND = [sys.executable, "-c", "from flatpush.cli import main; main()", "view", "--no-browser"]
 PATIENCE = 60  # for an answer on a busy machine [s]
+LONGEST = 1500.0  # that a server lives, for all tests of a file [s]
 
 
-class Served:
+class Served(ExitStack):
     """A server in a process of its own, and what it has said."""
 
     def __init__(self, *arguments):
-        self.process = subprocess.Popen(
-            [*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
+        super().__init__()
+        pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = self.enter_context(started([*COMMAND, *arguments], LONGEST, **pipes))
         self.said = ""
         while "token=" not in self.said:
             line = self.process.stderr.readline()
@@ -39,8 +43,6 @@ class Served:
             return error.code, error.headers, error.read()
 
     def stop(self):
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        self.process.wait(PATIENCE)
-        self.process.stderr.close()
-        self.process.stdout.close()
+        """Ends it by Ctrl-C; its status."""
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(PATIENCE)

@@ -1,23 +1,23 @@
 """A simulated controller of a robot as a process of its own, started by tests."""
 
 import json
-import os
 import subprocess
 import sys
-import time
+from contextlib import ExitStack
 from pathlib import Path
 
 from flatpush.testing import check_robot
+from tests.waiting import started, until
 
 
-class SimulatedController:
+class SimulatedController(ExitStack):
     """Runs a script of this folder, which says when it is ready, and then answers every line with what it saw."""
 
     def __init__(self, script, *options):
+        super().__init__()
         words = [sys.executable, str(Path(__file__).with_name(script)), *map(str, options)]
-        self.process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=dict(os.environ)
-        )
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = self.enter_context(started(words, patience=500, **pipes))
         self.process.stdout.readline()
 
     def asked(self):
@@ -26,22 +26,9 @@ class SimulatedController:
         self.process.stdin.flush()
         return json.loads(self.process.stdout.readline())
 
-    def until(self, seen, patience=60.0):
-        """What it saw when that became what is waited for; an error after some time [s]."""
-        due = time.monotonic() + patience
-        while not seen(told := self.asked()):
-            assert time.monotonic() < due, f"waited for {patience} s; the controller saw {told}"
-            time.sleep(0.01)
-        return told
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdin.close()
-        self.process.stdout.close()
+    def until(self, seen):
+        """What it saw when that became what is waited for."""
+        return until(lambda: (told := self.asked()) and seen(told) and told)
 
 
 def conforms(controller, robot):
@@ -50,16 +37,12 @@ def conforms(controller, robot):
     Args:
         controller: makes a SimulatedController. robot: makes the robot of one.
     """
-    running = []
+    with ExitStack() as running:
+        last = []
 
-    def make():
-        while running:
-            running.pop().__exit__()
-        running.append(controller())
-        return robot(running[-1])
+        def make():
+            running.close()
+            last[:] = [running.enter_context(controller())]
+            return robot(last[0])
 
-    try:
-        return len(check_robot(make, kill=lambda _: running[-1].process.kill()))
-    finally:
-        while running:
-            running.pop().__exit__()
+        return len(check_robot(make, kill=lambda _: last[0].process.kill()))

@@ -9,9 +9,8 @@ from tests.live_server import EXAMPLES, Served
 @pytest.fixture(scope="module")
 def server():
     """flatpush view of an example."""
-    found = Served(str(EXAMPLES / "triangle.yaml"), "--port", "0")
-    yield found
-    found.stop()
+    with Served(str(EXAMPLES / "triangle.yaml"), "--port", "0") as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests.command_line import flatpush
+from tests.waiting import python, started
 
 import flatpush as fp
 
@@ -38,14 +39,10 @@ main()
 def interrupted(arguments, folder, seconds):
     """How flatpush ends after Ctrl-C, so long after its start: status and what it said on stderr."""
     command = [sys.executable, "-c", HEEDFUL, *map(str, arguments)]
-    with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as running:
+    with started(command, cwd=folder, stderr=subprocess.PIPE) as running:
         time.sleep(seconds)
         running.send_signal(signal.SIGINT)
-        try:
-            _, errors = running.communicate(timeout=120)
-        except subprocess.TimeoutExpired:
-            running.kill()
-            raise
+        _, errors = running.communicate()
     return running.returncode, errors
 
 
@@ -227,9 +224,7 @@ def test_a_full_disk_leaves_no_file(folder):
     code = limit + "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
     code += "import sys; sys.argv = ['flatpush', 'plan', 'scene.yaml', '-o', 'plan.json'];"
     code += "from flatpush.cli import main; main()"
-    ended = subprocess.run(
-        [sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, text=True, timeout=120
-    )
+    ended = python("-B", "-c", code, cwd=folder)
     assert ended.returncode == 2, ended.stderr
     assert "plan.json" in ended.stderr
     assert "Traceback" not in ended.stderr
@@ -268,8 +263,7 @@ def test_every_example_plans_and_verifies(example, tmp_path):
 
 def test_help_and_version(tmp_path):
     """In a process of its own, as a user starts it."""
-    started = [sys.executable, "-m", "flatpush", "--help"]
-    shown = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    shown = python("-m", "flatpush", "--help", cwd=tmp_path)
     for command in ("plan", "verify", "simulate", "describe", "export", "init", "experiment"):
         assert command in shown.stdout
     assert "flatpush 0.2.0" in flatpush("--version", folder=tmp_path).stdout
@@ -284,9 +278,7 @@ def test_help_loads_nothing_heavy(tmp_path):
         "heavy = {'numpy', 'scipy', 'numba', 'pydantic', 'yaml', 'matplotlib', 'shapely', 'clarabel'}\n"
         "sys.exit(sorted(heavy & set(sys.modules)) or None)"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60
-    )
+    ended = python("-c", code, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
 
 
@@ -299,7 +291,5 @@ def test_a_plan_of_one_push_loads_no_compiler(folder):
         "except SystemExit: pass\n"
         "sys.exit(sorted({'numba', 'matplotlib', 'clarabel', 'scipy.optimize'} & set(sys.modules)) or None)"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=60
-    )
+    ended = python("-c", code, cwd=folder)
     assert ended.returncode == 0, ended.stderr

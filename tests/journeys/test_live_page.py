@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 from tests.live_server import PATIENCE, Served
+from tests.waiting import until
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
@@ -56,11 +57,7 @@ class Page:
         WebDriverWait(self.browser, patience, 0.05).until(lambda _: self.js(f"return Boolean({condition})"))
 
     def wait_for(self, file):
-        for _ in range(10 * PATIENCE):
-            if file.exists():
-                return
-            time.sleep(0.1)
-        raise AssertionError(f"{file.name} was not saved")
+        until(file.exists, PATIENCE)
 
     def settle(self):
         self.wait("!flatpush.busy")
@@ -418,8 +415,12 @@ def test_two_hundred_runs_are_told_as_they_finish_and_the_page_does_not_wait(pag
     assert page.plan["motion"]["object"][0][2] == pytest.approx(-np.pi / 4, abs=1e-4)
     page.press("m")
     counts = set()
-    while page.js("return !flatpush.many.told || flatpush.many.told.done < 200"):
+
+    def done():
         counts.add(page.js("return flatpush.many.told ? flatpush.many.told.done : 0"))
+        return 200 in counts
+
+    until(done, pause=0)
     assert page.text("runsdone").startswith("200 of 200 runs: ")
     assert counts - {0, 200}
     assert page.js("return document.querySelectorAll('#tube .band').length") >= 2
@@ -441,7 +442,9 @@ def test_numbers_that_are_none_are_refused_in_words_and_a_planner_that_dies_is_r
     page.press("c")
     page.wait("flatpush.feedback.live.times.length > 2")
     command = ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(page.server.process.pid)]
-    children = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    children = subprocess.run(
+        command, capture_output=True, text=True, check=True, timeout=PATIENCE
+    ).stdout.splitlines()
     (worker,) = (int(line.split()[0]) for line in children if "spawn_main" in line)
     os.kill(worker, signal.SIGKILL)
     page.wait("!flatpush.feedback.on")
@@ -483,9 +486,8 @@ def stored(tmp_path_factory):
     ]
     rows += [f"block,,,{k / 10},{-30 + k},3,0,{-58 + k},3,0,1" for k in range(31)]
     (folder / "run.csv").write_text("\n".join([*rows, "# ended: done", ""]), encoding="utf-8")
-    found = Served(str(folder / "run.csv"), "--scene", str(folder / "block.json"), "--port", "0")
-    yield plan, found
-    found.stop()
+    with Served(str(folder / "run.csv"), "--scene", str(folder / "block.json"), "--port", "0") as found:
+        yield plan, found
 
 
 @pytest.fixture

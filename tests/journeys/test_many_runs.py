@@ -2,11 +2,10 @@
 
 import json
 import socket
-import subprocess
-import sys
 
 import pytest
 from tests.command_line import flatpush
+from tests.waiting import python
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +39,8 @@ def test_the_report_tells_where_the_object_ends(plan, tmp_path):
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_numbers_as_one_process(plan):
     alone = flatpush("simulate", plan, "--runs", 120, "--seed", 7, "--json")
-    words = [
-        sys.executable,
-        "-m",
-        "flatpush",
-        *alone.args[1:],
-        "--cluster",
-    ]  # its workers are processes as well
-    spread = subprocess.run(words, capture_output=True, text=True, timeout=240)
+    # Its workers are processes as well.
+    spread = python("-m", "flatpush", *alone.args[1:], "--cluster", patience=240)
     assert alone.returncode == spread.returncode == 0, spread.stderr
     assert json.loads(alone.stdout) == json.loads(spread.stdout)
 

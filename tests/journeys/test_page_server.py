@@ -1,7 +1,6 @@
 """The server of the live page from outside: who gets what, and what it does with what is no message."""
 
 import json
-import signal
 import socket
 import subprocess
 import time
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.live_server import COMMAND, PATIENCE, Served
+from tests.waiting import until
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
@@ -42,10 +42,12 @@ def ask(line, number, kind, value):
 
 def hear(line, kind):
     """The next message of a kind."""
-    while True:
+
+    def heard():
         message = json.loads(line.recv(PATIENCE))
-        if message["kind"] == kind:
-            return message
+        return message if message["kind"] == kind else None
+
+    return until(heard, pause=0)
 
 
 def test_only_who_has_the_link_gets_the_page(server):
@@ -104,8 +106,7 @@ def flood(line, messages):
     for message in messages:
         line.send(message)
         time.sleep(0.001)
-    while True:
-        line.recv(PATIENCE)
+    until(lambda: line.recv(PATIENCE) and False, pause=0)
 
 
 def test_too_much_and_too_often_ends_the_connection_alone(server, talk):
@@ -130,21 +131,17 @@ def test_a_port_that_is_taken_is_not_in_the_way_and_ctrl_c_ends_everything():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        served = Served("--port", str(port))
-        assert f"port {port} is in use; this is port" in served.said
-        children = subprocess.run(
-            ["ps", "-o", "pid=", "--ppid", str(served.process.pid)], capture_output=True, text=True
-        ).stdout.split()
-        served.process.send_signal(signal.SIGINT)
-        assert served.process.wait(PATIENCE) == 130
-    assert "Traceback" not in served.process.stderr.read()
-    served.stop()
-    for _ in range(50):
-        left = [pid for pid in children if Path(f"/proc/{pid}").exists()]
-        if not left:
-            break
-        time.sleep(0.1)
-    assert not left
+        with Served("--port", str(port)) as served:
+            assert f"port {port} is in use; this is port" in served.said
+            children = subprocess.run(
+                ["ps", "-o", "pid=", "--ppid", str(served.process.pid)],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+            ).stdout.split()
+            assert served.stop() == 130
+            assert "Traceback" not in served.process.stderr.read()
+            until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in children), 5)
 
 
 def test_an_address_of_another_machine_is_refused_in_words():

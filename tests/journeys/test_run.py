@@ -1,13 +1,12 @@
 """flatpush run, as a user runs it."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from tests.waiting import started, until
 
 import flatpush as fp
 from flatpush.cli.app import app
@@ -117,14 +116,14 @@ main()
 """
 
 
-def start(files, *options, **more):
+def start(files, *options):
     words = [sys.executable, "-c", REAL, "run", str(files / "plan.json"), "--robot", "dry-run", *options]
-    return subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=dict(os.environ), **more)
+    return started(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
 
 def test_nothing_real_moves_unless_somebody_says_so(files):
-    asked = start(files, stdin=subprocess.DEVNULL)
-    _, told = asked.communicate(timeout=120)
+    with start(files) as asked:
+        _, told = asked.communicate()
     assert asked.returncode == 2
     assert "a robot moves only if somebody says so" in told
     assert "Traceback" not in told
@@ -133,16 +132,12 @@ def test_nothing_real_moves_unless_somebody_says_so(files):
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_stops_the_robot_and_leaves_a_log(files, tmp_path, how):
     log = tmp_path / "log.csv"
-    asked = start(files, "--yes", "--speed", "0.3", "--log", str(log), stdin=subprocess.DEVNULL)
-    patience = time.monotonic() + 120
-    while not (log.exists() and "segment 1" in log.read_text()):
-        assert time.monotonic() < patience
-        time.sleep(0.05)
-    while how == signal.SIGKILL and log.read_text().count("\n") < 10:
-        assert time.monotonic() < patience
-        time.sleep(0.05)
-    asked.send_signal(how)
-    _, told = asked.communicate(timeout=60)
+    with start(files, "--yes", "--speed", "0.3", "--log", str(log)) as asked:
+        until(lambda: log.exists() and "segment 1" in log.read_text())
+        if how == signal.SIGKILL:
+            until(lambda: log.read_text().count("\n") >= 10)
+        asked.send_signal(how)
+        _, told = asked.communicate()
     assert "Traceback" not in told
     if how != signal.SIGKILL:
         assert asked.returncode == 130

@@ -10,6 +10,7 @@ import warnings
 
 import numpy as np
 import pytest
+from tests.waiting import python, started, until
 
 from flatpush import compiled, compiling, kernel_store
 from flatpush.cli.common import CompilingNotice
@@ -94,33 +95,22 @@ def test_what_one_process_compiles_another_waits_for_and_reads(own_store):
         "sys.stdin.readline()\n"
         "print(made(2.0), sum(made.stats.cache_hits.values()), sum(made.stats.cache_misses.values()))\n"
     )
-    both = [
-        subprocess.Popen(
-            [sys.executable, "-c", "import sixfold"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=own_store.parent,
-        )
-        for _ in range(2)
-    ]
-    for process in both:
-        process.stdin.write("\n")
-        process.stdin.flush()
-    told = sorted(process.communicate(timeout=120)[0].split() for process in both)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": own_store.parent}
+    one, other = ([sys.executable, "-c", "import sixfold"] for _ in range(2))
+    with started(one, **pipes) as first, started(other, **pipes) as second:
+        for process in (first, second):
+            process.stdin.write("\n")
+            process.stdin.flush()
+        told = sorted(process.stdout.read().split() for process in (first, second))
     assert told == [["12.0", "0", "1"], ["12.0", "1", "0"]]
     assert [name for name in os.listdir(own_store) if name.endswith(".lock")] == []
 
 
 def test_a_claim_is_had_by_one_process_and_ends_with_it(own_store):
     code = "import sys, flatpush.kernel_store as k; print(k.claim('name'), flush=True); sys.stdin.read()"
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as other:
+    with started([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout.readline() == "True\n"
         assert not kernel_store.claim("name", 0.1)
-        other.kill()
-        other.wait(timeout=60)
     assert kernel_store.claim("name", 60.0)
     assert kernel_store.claim("name")  # its own
     kernel_store.release("name")
@@ -256,7 +246,7 @@ def test_a_kernel_that_does_not_compile_leaves_the_clock_running(own_store):
 
 def test_neither_the_clock_nor_the_controllers_import_numba():
     code = "import sys, flatpush.control, flatpush.compiling; sys.exit('numba' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+    assert python("-c", code).returncode == 0
 
 
 class Terminal(io.StringIO):
@@ -278,11 +268,6 @@ def test_a_terminal_shows_how_far_compiling_is_and_is_left_clean():
     stream = Terminal()
     notice = CompilingNotice(stream, period=0.005)
     notice(compiling.Work("simulation.roll", 5, 20))
-    assert comes_true(lambda: "simulation.roll █████··············· 5 of 20, 0 s" in stream.getvalue())
+    assert until(lambda: "simulation.roll █████··············· 5 of 20, 0 s" in stream.getvalue())
     notice(compiling.Work("simulation.roll", 20, 20, over=True))
-    assert comes_true(lambda: stream.getvalue().endswith("\r\033[K"))
-
-
-def comes_true(condition) -> bool:
-    """Within ten seconds."""
-    return any(condition() or time.sleep(0.005) for _ in range(2000))
+    assert until(lambda: stream.getvalue().endswith("\r\033[K"))

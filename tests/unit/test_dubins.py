@@ -1,10 +1,8 @@
 """Named Dubins cases, shapes, and what is refused."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from tests.waiting import python
 
 from flatpush.errors import InputError
 from flatpush.steering import dubins, shortest_word
@@ -101,7 +99,7 @@ def test_the_compiler_is_not_loaded_for_one_path():
         "shortest_word([0,1],[0,-1],[1,0],[0,0,0],[1,1,1]);"
         "sys.exit('numba' in sys.modules)"
     )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    assert python("-c", code).returncode == 0
 
 
 @pytest.mark.parametrize("radius", [1e-154, 1e10, 0.0, np.inf, np.nan, True, "1"])

@@ -1,9 +1,7 @@
 """Externally Guided Motion over loopback: a simulated controller in a process of its own, judged by its cycles."""
 
 import math
-import os
 import socket
-import subprocess
 import sys
 import time
 from importlib.util import find_spec
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
+from tests.waiting import python, started
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
@@ -100,16 +99,12 @@ def test_the_arm_stops_within_25_cycles_when_this_side_is_killed_or_freezes(how)
 
     with Controller("--patience", 0.2) as controller:
         words = [sys.executable, "-c", CLIENT, str(controller.port), str(SCRIPT.parents[1])]
-        client = subprocess.Popen(words, env=dict(os.environ))
-        try:
+        with started(words) as client:
             controller.until(lambda told: told["answered"] >= 100)
             client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
             seen = controller.until(lambda told: told["stopped"] >= 0)
             time.sleep(0.3)
             later = controller.asked()
-        finally:
-            client.kill()
-            client.wait()
     # 25 cycles of 4 ms are 100 ms; after them the arm stays where it is.
     assert seen["worst"] == 25
     assert later["farthest"] < 1e-9
@@ -205,8 +200,7 @@ def test_robotware_7_by_its_own_library():
     if find_spec("ABBRobotEGM") is None:
         pytest.skip("ABBRobotEGM is not installed")
     with Controller() as controller:
-        words = [sys.executable, "-c", SEVEN, str(controller.port), str(SCRIPT.parents[1])]
-        told = subprocess.run(words, capture_output=True, text=True, env=dict(os.environ), timeout=120)
+        told = python("-c", SEVEN, controller.port, SCRIPT.parents[1])
         seen = controller.asked()
     assert told.returncode == 0, told.stderr
     outcome, cycles, off = told.stdout.split()

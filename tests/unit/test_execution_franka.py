@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
+from tests.waiting import until
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
@@ -69,8 +70,7 @@ def test_a_velocity_that_is_not_renewed_ends_after_a_tenth_of_a_second():
         start = robot.state()
         robot.send(Target(robot.time + 0.01, start.pose, np.array([0.05, 0.0, 0.0, 0.0])))
         begun = robot.time
-        while robot.time < begun + 0.2:
-            robot.receive()
+        until(lambda: (robot.receive(), robot.time >= begun + 0.2)[1], pause=0)
         after = robot.state()
         far = after.pose[0] - start.pose[0]
         assert 0.002 < far < 0.05 * 0.11

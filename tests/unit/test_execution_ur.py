@@ -5,7 +5,6 @@ import math
 import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
+from tests.waiting import started
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
@@ -105,16 +105,12 @@ with robot_at(sys.argv[1]) as robot:
 def test_the_watchdog_stops_the_arm_when_this_side_is_killed_or_freezes(how):
     with Controller("--patience", 0.2) as controller:
         words = [sys.executable, "-c", CLIENT, controller.host, str(Path(__file__).parents[2])]
-        client = subprocess.Popen(words, env=dict(os.environ))
-        try:
+        with started(words) as client:
             controller.until(lambda told: told["commands"] >= 100)
             client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
             seen = controller.until(lambda told: told["fired"] >= 0)
             time.sleep(0.3)
             later = controller.asked()
-        finally:
-            client.kill()
-            client.wait()
     # The watchdog of 10 Hz waits for 12.5 cycles of 8 ms.
     assert seen["fired"] - seen["heard"] == 13
     assert later["far"] < 1e-9

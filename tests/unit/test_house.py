@@ -5,12 +5,11 @@ import dataclasses
 import importlib
 import inspect
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.waiting import python
 
 ROOT = Path(__file__).parents[2]
 # What breaks the rule of Any below and is still to be mended: it only shrinks.
@@ -27,17 +26,13 @@ MOST_ANY = 18
     ids=lambda command: " ".join(command[:2]),
 )
 def test_tools_agree(command):
-    ended = subprocess.run(
-        [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, timeout=600
-    )
+    ended = python("-m", *command, cwd=ROOT, patience=500)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 def test_imports_go_up_the_list_only():
     code = "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imports())"
-    ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300
-    )
+    ended = python("-c", code, cwd=ROOT)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
@@ -264,6 +259,32 @@ def test_no_test_passes_with_nothing_asserted():
     assert not {
         (path.name, name) for path in files for name in silent_tests(path.read_text(encoding="utf-8"))
     }
+
+
+WAITING = {"wait", "join", "recv", "result", "acquire"}  # for ever, unless told how long
+STARTING = {"subprocess.run", "subprocess.Popen", "subprocess.check_output"}
+
+
+def endless(text: str) -> list[str]:
+    """What in a file of tests may wait for ever: for another process or thread, or in a loop that pauses."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Call(args=[], keywords=[]) if called(node) in WAITING:
+                found.append(ast.unparse(node))
+            case ast.Call(keywords=named) if ast.unparse(node.func) in STARTING:
+                found += [] if "timeout" in {word.arg for word in named} else [ast.unparse(node)]
+            case ast.While() if "sleep" in {called(part) for part in ast.walk(node)}:
+                found.append(ast.unparse(node.test))
+    return found
+
+
+def test_no_test_waits_for_ever():
+    """tests/waiting.py starts processes and waits for them, and all of its waits end."""
+    for text in ("a.wait()", "subprocess.run([])", "while a:\n    time.sleep(1)"):
+        assert endless(text)
+    files = set((ROOT / "tests").rglob("*.py")) - {ROOT / "tests" / "waiting.py"}
+    assert not {(path.name, what) for path in files for what in endless(path.read_text(encoding="utf-8"))}
 
 
 SAYS = re.compile(

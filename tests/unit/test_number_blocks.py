@@ -1,11 +1,10 @@
 """Numbers in the documents that a command writes: compared as numbers, and the quick ones stand as printed."""
 
 import importlib.util
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.waiting import python
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "docs" / "number_blocks.py"
@@ -49,9 +48,7 @@ def test_every_block_has_a_command_and_is_filled(blocks):
 
 @pytest.mark.slow
 def test_blocks_stand_as_their_commands_print_them():
-    ended = subprocess.run(
-        [sys.executable, SCRIPT, "--check"], capture_output=True, text=True, timeout=600, check=False
-    )
+    ended = python(SCRIPT, "--check", patience=500)
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 

@@ -27,8 +27,8 @@ def backwards(function, jobs, told):
         futures = {pool.submit(function, job): job for job in reversed(jobs)}
         done = {}
         for future in as_completed(futures):
-            told(future.result())
-            done[futures[future]] = future.result()
+            done[futures[future]] = future.result(60)
+            told(done[futures[future]])
     return [done[job] for job in jobs]
 
 

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from tests.waiting import python
 
 from flatpush.errors import InputError
 from flatpush.friction import CollinearSupportWarning, Ellipsoid, Exact, Quartic, Support, fit_surface
@@ -278,10 +279,7 @@ def indefinite(gram: np.ndarray) -> np.ndarray:
 
 
 def test_importing_the_package_is_light() -> None:
-    import subprocess
-    import sys
-
     heavy = "('scipy', 'clarabel', 'shapely', 'numba')"
     code = f"import sys, flatpush.friction; print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    done = python("-c", code)
+    assert done.stdout.strip() == "[]", done.stderr

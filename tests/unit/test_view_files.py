@@ -3,8 +3,6 @@
 import io
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,6 +15,7 @@ from tests.drawn_plans import (
     follow,
     make_plan,
 )
+from tests.waiting import python
 
 import flatpush.view
 from flatpush.errors import InputError
@@ -209,8 +208,8 @@ def test_a_missing_folder_and_a_folder_are_refused(tmp_path):
 
 def test_importing_the_package_imports_neither_matplotlib_nor_pillow():
     code = "import sys, flatpush.view; print([m for m in ('matplotlib', 'PIL') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    done = python("-c", code)
+    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_a_picture_in_svg_needs_no_font(tmp_path):
@@ -222,8 +221,8 @@ def test_a_picture_in_svg_needs_no_font(tmp_path):
         f"save_figure(load_plan({str(tmp_path / 'plan.json')!r}), {str(tmp_path / 'plan.svg')!r});"
         "print([m for m in ('matplotlib', 'PIL', 'html', 'colorsys') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    done = python("-c", code)
+    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_nothing_is_drawn_with_matplotlib():
