@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from tests.command_line import flatpush
 
+from flatpush.cli.app import app
 from flatpush.cli.recordings import read_recordings
 from flatpush.documents import load_robot_log
 from flatpush.documents.calibration_file import CalibrationFile, load_calibration, save_calibration
+from flatpush.documents.robot_log import RAW
 from flatpush.errors import InputError
 from flatpush.geometry import compose, inverse
 from flatpush.problem import Object
@@ -192,6 +194,22 @@ def test_an_object_that_was_not_seen_has_empty_cells_under_names_of_ones_own(tmp
     path.write_text("t,ox,y,theta,px,py\n0,0,,0,1,2\n")
     with pytest.raises(InputError, match="line 2: y is not a number"):
         load_robot_log(path, columns={"x": "ox"})
+
+
+def test_unusable_rows_are_left_out_and_listed_if_asked(tmp_path, capsys):
+    scene, log = tmp_path / "scene.yaml", tmp_path / "cut.csv"
+    scene.write_text(SCENE)
+    rows = ["0,1,2,0.1,-30,2,0.1,1", "1,1,2,0.1", *(f"{t},1,{t},0.1,-60,3,0.1,1" for t in (2, 3, 4))]
+    log.write_text("\n".join([",".join(RAW), *rows]) + "\n")
+    with pytest.raises(InputError, match=r"line 3: it has 4 of 8 columns.*--skip-bad"):
+        read_recordings([log], [scene], {})
+    (one,), _ = read_recordings([log], [scene], {}, skip_bad=True)
+    assert one.run.lines.tolist() == [2, 4, 5, 6]
+    assert "cut.csv: line 3 left out: it has 4 of 8 columns" in capsys.readouterr().err
+    assert app(["replay", str(log), "--scene", str(scene), "--skip-bad"], standalone_mode=False) == 0
+    told = capsys.readouterr()
+    assert "cut.csv: line 3 left out" in told.err
+    assert "1 runs: " in told.out
 
 
 def test_what_does_not_belong_together_is_refused(tmp_path):

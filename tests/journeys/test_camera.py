@@ -123,6 +123,8 @@ def test_bad_input_is_one_line(folder, tmp_path, flatpush):
         ([*pictures(folder), *camera, "--tag", OBJECT, "--finger", "3,20,50"], "two objects have one tag"),
         ([*pictures(folder), "--camera", str(folder / "0.png"), "--tag", OBJECT], "not text"),
         ([*pictures(folder), *camera, "--tag", "3,25"], "takes 3 numbers"),
+        ([*pictures(folder), *camera, "--tag", "1000,30,20"], "a number from 0 to 586"),
+        ([*pictures(folder), *camera, "--tag", OBJECT, "--latency", "-1"], "--latency is a finite number"),
         (["97", *camera, "--tag", OBJECT], "there is no such camera"),
     ):
         status, _, error = flatpush("camera", "watch", *arguments)

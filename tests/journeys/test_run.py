@@ -65,6 +65,7 @@ def test_a_plan_is_run_reported_logged_and_drawn(files, tmp_path, capsys):
         (("--robot", "sim", "--log", "log.txt"), "a log ends in .csv or .mcap"),
         (("--robot", "sim", "--controller", "pid"), "path, dfl, horizon"),
         (("--robot", "dry-run", "--controller", "path"), "does not see the object"),
+        (("--robot", "sim", "--controller", "path", "--latency", "-1"), "--latency is a finite number"),
         (("--robot", "sim", "--base-frame", "1,2"), "--base-frame takes 4 numbers"),
     ],
 )

@@ -22,6 +22,7 @@ from flatpush.execution import (
     run,
 )
 from flatpush.execution.course import Course, approach, planned
+from flatpush.execution.egm import egm
 from flatpush.execution.run import Played, stream, way
 from flatpush.execution.simulated import DryRun, SimRobot, Unknown, home_of
 from flatpush.simulation.plant import Plant
@@ -372,6 +373,12 @@ def test_addresses():
         Address.parse("sim?speed=fast").limits(Limits())
     with pytest.raises(fp.InputError, match="no address of a robot"):
         Address.parse("egm://host:port")
+
+
+def test_no_controller_sends_to_port_0(short_plan):
+    """`egm://host:0` took the usual port without a word."""
+    with pytest.raises(fp.InputError, match="a port from 1 to 65535"):
+        egm(Address.parse("egm://127.0.0.1:0"), short_plan)
 
 
 def test_robots_of_others_come_by_entry_points(short_plan, monkeypatch):

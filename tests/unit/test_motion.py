@@ -50,6 +50,13 @@ def fitted():
     return fit_motion(pushed(), EXPECTED, TIP)
 
 
+def test_one_frame_tells_nothing_and_warns_of_nothing():
+    """The median of no differences was a warning of numpy's before the refusal."""
+    one = Motion("one", np.zeros(1), np.zeros((1, 3)), np.zeros((1, 2)), np.array([2]))
+    with pytest.raises(InputError, match="no recording holds a push of 15 mm"):
+        look([one], EXPECTED.outline, TIP)
+
+
 def test_loads_and_friction_come_from_poses_alone(fitted):
     spread = fitted.pressure.at(fitted.numbers)
     summary = summarise(fitted, [], [])

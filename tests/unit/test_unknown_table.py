@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flatpush import InputError, load_scene, plan
+from flatpush.cli.app import app
 from flatpush.control import Camera, SimulatedSensor
 from flatpush.control.horizon.controller import HorizonController
 from flatpush.control.loop.closed_loop import drive
@@ -48,6 +49,14 @@ def test_an_unknown_table_is_read_only_where_it_can_be_learned(tmp_path):
     with pytest.raises(InputError, match="unknown"):
         parse_scene({"flatpush": "scene/1", "object": {"outline": {"circle": 1}, "support": "unknown", "friction": 0.3},
                      "start": [0, 0, 0], "goal": [1, 0, 0]})  # fmt: skip
+
+
+def test_a_controller_that_an_unknown_table_does_not_take_is_refused(tmp_path):
+    """It was passed over without a word."""
+    path = tmp_path / "scene.yaml"
+    path.write_text(TEXT)
+    with pytest.raises(InputError, match="by the controller horizon"):
+        app(["track", str(path), "--learn", "--controller", "path"], standalone_mode=False)
 
 
 def test_first_pushes_take_one_finger_and_no_obstacles():

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .common import print_json, telling
-from .recordings import COLUMNS, UNITS, carried_of, read_recordings
+from .recordings import COLUMNS, SKIP_BAD, UNITS, carried_of, read_recordings
 
 
 def command(
@@ -29,6 +29,7 @@ def command(
     ] = None,
     columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
     units: Annotated[str, typer.Option(metavar="UNITS", help=UNITS)] = "",
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help=SKIP_BAD)] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Fit camera map, tag offsets, finger inset, lag and friction to LOGS, judged on starts that were left out."""
@@ -40,7 +41,7 @@ def command(
 
     check_outputs([*logs, *scene], [output])
     carried = carried_of(tag)
-    recordings, setup = read_recordings(logs, scene, carried, columns=columns, units=units)
+    recordings, setup = read_recordings(logs, scene, carried, columns=columns, units=units, skip_bad=skip_bad)
     with telling("calibrating"):
         found = calibrate(recordings, setup)
     p, left = found.parameters, found.left_out

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from .common import numbers, pose_text, print_json
+from .common import check_latency, numbers, pose_text, print_json
 
 if TYPE_CHECKING:
     from ..vision.eyes import Frame
@@ -158,8 +158,9 @@ def watch_command(
 
     live = len(source) == 1 and source[0].isdigit()
     check_outputs([camera, *([] if live else [Path(name) for name in source])], [log])
-    if not (math.isfinite(rate) and rate > 0 and math.isfinite(latency)):
-        raise InputError("--rate is positive, and --latency finite")
+    if not (math.isfinite(rate) and rate > 0):
+        raise InputError("--rate is positive and finite", value=rate)
+    check_latency(latency)
     worn = {"object": tag_of(tag, "--tag")}
     if finger is not None:
         worn["finger"] = tag_of(finger, "--finger")

@@ -40,6 +40,12 @@ def numbers(text: str | None, count: int, option: str) -> list[float] | None:
     return values
 
 
+def check_latency(seconds: float) -> None:
+    """Refuses a --latency that is none."""
+    if not (math.isfinite(seconds) and seconds >= 0):
+        raise InputError("--latency is a finite number of seconds, 0 or more", value=seconds)
+
+
 def pose_text(pose: "Array | Sequence[float]") -> str:
     """A pose in mm and degrees, the angle within half a turn, or any."""
     turn = 0.0 if math.isnan(pose[2]) else math.remainder(math.degrees(pose[2]), 360)

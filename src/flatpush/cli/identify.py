@@ -8,7 +8,7 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
-from .recordings import COLUMNS, UNITS, layout_of
+from .recordings import COLUMNS, SKIP_BAD, UNITS, layout_of
 
 if TYPE_CHECKING:
     from ..friction import Quartic
@@ -69,9 +69,7 @@ def command(
     seeds: Annotated[
         int, typer.Option(metavar="N", help="How many cross-validations, each shuffled anew.")
     ] = 2,
-    skip_bad: Annotated[
-        bool, typer.Option("--skip-bad", help="Leave unusable rows out, and list them.")
-    ] = False,
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help=SKIP_BAD)] = False,
     columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
     suggests: Annotated[
         bool, typer.Option("--suggest", help="From motion: the next three pushes that would teach most.")

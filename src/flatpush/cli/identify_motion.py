@@ -9,7 +9,7 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
-from .recordings import layout_of
+from .recordings import layout_of, tell_left_out
 
 if TYPE_CHECKING:
     from ..documents import Motion
@@ -53,8 +53,7 @@ def identify_motion(asked: Asked) -> int:
                 source=str(path),
                 hint="Friction from motion takes pushes of one finger, with a scene that says pusher: {fingers: 1}.",
             )
-        for row in file.left_out:
-            typer.echo(f"{path}: line {row.line} left out: {row.reason}", err=True)
+        tell_left_out(path, file.left_out)
         motions += file.motions
     with telling("fitting"):
         fit = fit_motion(motions, scene.object, scene.pusher.tip_radius)

@@ -5,9 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import typer
+
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..documents.rows import BadRow
     from ..geometry.pose import Array
     from ..simulation.calibration import Setup
     from ..simulation.replay import Recording
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
 COLUMNS = (
     "Your own names of columns: x=obj_x[mm],theta=yaw; by default those that the scene gives for its logs."
 )
+SKIP_BAD = "Leave unusable rows out, and list them."
 UNITS = "Units of columns that do not name them: m, cm or mm, and rad or deg; by default the scene's logs, or m,rad."
 
 
@@ -26,6 +30,7 @@ def read_recordings(
     *,
     columns: str = "",
     units: str = "",
+    skip_bad: bool = False,
 ) -> "tuple[tuple[Recording, ...], Setup]":
     """The runs in logs, and objects, fingers and tags.
 
@@ -35,7 +40,7 @@ def read_recordings(
         logs: files. scenes: one for each object, of one pusher.
         carried: which tag an object carries, where several share one.
         pivot: of the camera's map (2,) [m]; default: amid the runs.
-        columns, units: the options of these names; by default what the scenes say of their logs.
+        columns, units, skip_bad: the options of these names; by default what the scenes say of their logs.
 
     Raises:
         InputError: for a log or a scene that is none, scenes of different pushers or of one name.
@@ -56,7 +61,8 @@ def read_recordings(
     own, length, angle = layout_of(scenes, columns, units)
     recordings = []
     for log in logs:
-        file = load_robot_log(log, columns=own, length=length, angle=angle)
+        file = load_robot_log(log, columns=own, length=length, angle=angle, skip_bad=skip_bad)
+        tell_left_out(log, file.left_out)
         if not file.turned and read[0][1].pusher.fingers == 2:
             raise InputError(
                 "the turn of a hand with two fingers is not in this log",
@@ -83,6 +89,12 @@ def read_recordings(
     middle = np.mean([one.final[:2] for one in recordings], axis=0) if pivot is None else pivot
     objects = {scene.object.name: scene.object for _, scene in read}
     return tuple(recordings), Setup(objects, fingers, pusher.tip_radius, middle, dict(carried))
+
+
+def tell_left_out(path: Path, rows: "Sequence[BadRow]") -> None:
+    """Lists the rows of a file that were left out."""
+    for row in rows:
+        typer.echo(f"{path}: line {row.line} left out: {row.reason}", err=True)
 
 
 def layout_of(scenes: Sequence[Path], columns: str, units: str) -> tuple[dict[str, str], str, str]:

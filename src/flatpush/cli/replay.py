@@ -9,7 +9,7 @@ import typer
 
 from ..errors import InputError
 from .common import print_json, telling
-from .recordings import COLUMNS, UNITS, read_recordings
+from .recordings import COLUMNS, SKIP_BAD, UNITS, read_recordings
 
 
 def command(
@@ -32,6 +32,7 @@ def command(
     figure: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw every run as a dot.")] = None,
     columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
     units: Annotated[str, typer.Option(metavar="UNITS", help=UNITS)] = "",
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help=SKIP_BAD)] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Move the simulated fingers as in LOGS and compare where the object ends with where the camera saw it."""
@@ -55,7 +56,9 @@ def command(
         kept = load_calibration(calibration)
         p = Parameters(kept.camera, kept.tags, kept.inset, kept.friction, kept.lag)
         carried, pivot = kept.carried, kept.pivot
-    recordings, setup = read_recordings(logs, scene, {}, pivot, columns=columns, units=units)
+    recordings, setup = read_recordings(
+        logs, scene, {}, pivot, columns=columns, units=units, skip_bad=skip_bad
+    )
     setup = type(setup)(setup.objects, setup.fingers, setup.tip_radius, setup.pivot, carried)
     unknown = [n for n in setup.objects if p.tags and setup.tag(n) not in p.tags]
     if unknown:

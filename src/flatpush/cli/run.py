@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from ..errors import InputError
-from .common import error_text, numbers, pose_text, print_json, tell_failed
+from .common import check_latency, error_text, numbers, pose_text, print_json, tell_failed
 from .track import CONTROLLERS
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def command(
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
+    check_latency(latency)
     if (camera is None) != (tag is None) or (camera is not None and controller is None):
         raise InputError("--camera, --tag and --controller go together")
     frame = numbers(base_frame, 4, "--base-frame")

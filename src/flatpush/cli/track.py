@@ -31,8 +31,9 @@ def command(
         typer.Argument(metavar="PLAN", help="The plan document (JSON), or a scene whose support is unknown."),
     ],
     controller: Annotated[
-        str, typer.Option(metavar="NAME", help="The controller: path, dfl or horizon.")
-    ] = "path",
+        str | None,
+        typer.Option(metavar="NAME", help="The controller: path (the default), dfl or horizon."),
+    ] = None,
     rate: Annotated[float, typer.Option(metavar="HZ", help="How often the controller decides.")] = 60.0,
     noise: Annotated[
         str, typer.Option(metavar="MM,DEG", help="Standard deviations of the measured pose.")
@@ -112,7 +113,7 @@ def command(
     from ..control.tracking.simulated_run import TrackedRun
     from ..documents import check_outputs, load_plan, plan_files
 
-    if controller not in CONTROLLERS:
+    if controller is not None and controller not in CONTROLLERS:
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
     if timing not in TIMINGS:
         raise InputError(f"--timing is one of {', '.join(TIMINGS)}", value=timing)
@@ -131,7 +132,7 @@ def command(
         numbers(start, 3, "--start") or [],
     )
     tracked = TrackedRun(
-        cast("Law", controller),
+        cast("Law", controller or "path"),
         rate,
         cast("Timing", timing),
         learn,
@@ -154,6 +155,10 @@ def command(
                 "this scene does not know where its object presses on the table", source=str(plan),
                 hint="Add --learn: it is learned by first pushes.",
             )  # fmt: skip
+        if controller not in (None, "horizon"):
+            raise InputError(
+                "an unknown table is learned on the way by the controller horizon", value=controller
+            )
         if figure is not None:
             raise InputError("--figure draws a run beside its plan, and here is none", value=str(figure))
         return _learned(tracked, scene, table, log, as_json)
@@ -175,7 +180,7 @@ def command(
 
         save_followed(run, loaded.scene.object.name, log)
     distance, turn = goal_error(loaded, run.object[-1])
-    how = "slides" if loaded.slides else controller
+    how = "slides" if loaded.slides else tracked.controller
     result = {
         "controller": how,
         "outcome": run.outcome,

@@ -139,7 +139,7 @@ def load_robot_log(
         last[key] = (values[0], line)
         good.setdefault(key, []).append((line, values))
     if bad and not skip_bad:
-        raise refusal(bad, source, ": load_robot_log(path, skip_bad=True)")
+        raise refusal(bad, source, ": --skip-bad, or load_robot_log(path, skip_bad=True)")
     if not good:
         raise InputError("the log holds no usable row", source=source, hint=_FORMAT)
     stem = Path(source).stem

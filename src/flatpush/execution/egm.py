@@ -229,4 +229,10 @@ def egm(address: Address, plan: Plan) -> EgmRobot:
     robotware = round(address.numbers("robotware", 1, (6,))[0])
     limits = address.with_arm(limits)
     address.check_used()
+    if address.port == 0:
+        raise InputError(
+            "a controller sends to a port from 1 to 65535",
+            value=address.text,
+            hint=f"Its usual one is {PORT}.",
+        )
     return EgmRobot(address.host, address.port or PORT, address.base, limits, connect, silence, robotware)

@@ -143,6 +143,8 @@ def _refuse_jumps(motion: Motion) -> None:
 
 def _pushing(motion: Motion, size: float) -> list[tuple[int, int]]:
     """First and last + 1 frame of each part in which the finger moves on and the object with it."""
+    if len(motion.times) < LEAST_FRAMES:
+        return []
     step = np.hypot(*np.diff(motion.tips, axis=0).T)
     way = np.concatenate([[0.0], np.cumsum(step)])
     turned = np.unwrap(motion.poses[:, 2])

@@ -7,6 +7,8 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.pose import Array
 
+# Tags of the family tag36h11.
+TAGS = 587
 # A tag is nowhere farther from the origin of its object than this [m]; its angle may be as many radians.
 FAR = 100.0
 
@@ -29,6 +31,12 @@ class Tag:
         pose = np.array(self.pose, dtype=float)
         pose.setflags(write=False)
         object.__setattr__(self, "pose", pose)
+        if not 0 <= self.number < TAGS:
+            raise InputError(
+                f"a tag of the family tag36h11 has a number from 0 to {TAGS - 1}",
+                key="tag.number",
+                value=self.number,
+            )
         if not (np.isfinite(self.size) and self.size > 0):
             raise InputError("the size of a tag is positive", key="tag.size", value=self.size)
         if not (np.isfinite(self.height) and self.height >= 0):
