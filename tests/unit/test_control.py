@@ -446,6 +446,7 @@ def test_a_run_that_touches_what_is_in_the_way_says_so(one_finger_plan):
     ):
         plan = replace(one_finger_plan, scene=replace(scene, workspace=fp.Workspace(bounds, obstacles)))
         first = times[np.argmax(x > reached + 1e-4)]
-        assert touched(plan, done) == (f"{what} after {first:.2f} s" if what else "")
+        tips = plan.on_table[0].fingers
+        assert touched(plan.scene, tips, done) == (f"{what} after {first:.2f} s" if what else "")
         # Lifted, and with the object at rest, nothing is touched.
-        assert touched(plan, replace(done, object=0 * object_, heights=np.ones(n))) == ""
+        assert touched(plan.scene, tips, replace(done, object=0 * object_, heights=np.ones(n))) == ""

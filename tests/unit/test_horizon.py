@@ -173,7 +173,7 @@ def test_the_next_push_is_the_first_of_the_best_way():
         for o in (push_option(scene, push) for push in scene.pushes)
     ]
     names = [push.name for push in scene.pushes]
-    k, target, length = next_push(cars, np.array([-0.1, 0.0, 0.0]), np.zeros(3), 0.03)
+    k, target, length, _ = next_push(cars, np.array([-0.1, 0.0, 0.0]), np.zeros(3), 0.03)
     assert names[k] == "left"
     np.testing.assert_allclose(target, 0, atol=1e-9)
     assert length == pytest.approx(0.1)
@@ -428,8 +428,11 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(fp.InputError, match="one finger"):
         HorizonController.of(fp.load_scene("examples/rectangle_boundary.yaml"))
     walls = replace(scene, workspace=fp.Workspace((-1, -1, 1, 1), ()))
-    with pytest.raises(fp.InputError, match="obstacles and bounds"):
-        HorizonController.of(walls)
+    around = replace(walls, pusher=replace(scene.pusher, transit="planar"))
+    with pytest.raises(fp.InputError, match="lifts the finger"):
+        HorizonController.of(around)
+    with pytest.raises(fp.InputError, match="a goal with an angle"):
+        HorizonController.of(replace(walls, goal=(0.0, 0.0, np.nan)))
     slippery = replace(scene, object=fp.Object(scene.object.outline, friction=0.0))
     with pytest.raises(fp.InputError, match="no push of this scene can be steered"):
         HorizonController.of(slippery)

@@ -13,7 +13,7 @@ from ...planning import Planner
 from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
 from ..laws.push_controller import pusher_velocity
-from ..laws.rest_of_path import rest_of_path
+from ..laws.rest_of_path import Rest, rest_of_path
 from ..laws.steering_model import SteeringModel
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
@@ -22,9 +22,11 @@ from ..loop.limits import Limits, beyond, braking
 from ..loop.measurement import Command, Measurement
 from .contact_car import ContactCar
 from .contact_observer import EDGE, LOST, ContactObserver, nearest_contact
-from .landings import next_push
+from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
 from .state import HorizonState, LearningWindow
+from .surroundings import GUARD, Surroundings
+from .way import Way
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
 # friction that is a fifth less than believed.
@@ -44,6 +46,11 @@ RESUMES = 5
 # Pushes that failed so often are left out, and those whose straight force lies nearer to the edge of the friction cone
 # than this share of its half angle.
 FAILURES, LEEWAY = 3, 0.15
+# Among things the last stretch of the last push, so many radii long, is planned anew at every tick. Before it the
+# finger keeps to the way; a push ends that is off it by so many radii, or by so much of its heading [rad].
+LAST, ASTRAY, SKEWED = 1.5, 0.5, 0.7
+# So often it looks where no way is found, before it gives up.
+LOOKS = 3
 # Object and finger keep so far from the bounds, for what a prediction over the camera's latency may be off [m].
 ROOM = 0.002
 # What another landing counts as at least: each begins with the errors of a look at the object [m].
@@ -68,6 +75,7 @@ class HorizonController(AbstractController[HorizonState]):
         sd: standard deviation of a frame's angle [rad], for learning.
         bounds: xmin, ymin, xmax, ymax [m]; a push ends before the object or the finger would leave them, and another is
             tried. Ways are planned without regard to them.
+        surroundings: what ways, landings and retreats keep clear of; None where nothing is in the way.
     """
 
     scene: Scene
@@ -82,6 +90,7 @@ class HorizonController(AbstractController[HorizonState]):
     sd: float = float(np.deg2rad(0.3))
     noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
     bounds: tuple[float, float, float, float] | None = None
+    surroundings: Surroundings | None = None
 
     @cached_property
     def limits(self) -> Limits:  # type: ignore[override]
@@ -126,10 +135,19 @@ class HorizonController(AbstractController[HorizonState]):
         scene = plan.scene if isinstance(plan, Plan) else plan
         if not (np.isfinite(latency) and latency >= 0):
             raise InputError("a latency is 0 or more", key="latency", value=latency)
-        if scene.workspace.bounds is not None or scene.workspace.obstacles:
+        crowded = scene.workspace.bounds is not None or bool(scene.workspace.obstacles)
+        if crowded and scene.pusher.transit != "lift":
             raise InputError(
-                "the horizon controller plans anew without regard to obstacles and bounds, and this scene has some",
-                hint="Follow the plan with the path controller.",
+                "among bounds and obstacles the horizon controller lifts the finger between pushes",
+                key="pusher.transit",
+                value=scene.pusher.transit,
+                hint="transit: lift, or follow the plan with the path controller.",
+            )
+        if crowded and np.isnan(scene.goal_pose[2]):
+            raise InputError(
+                "among bounds and obstacles the horizon controller needs a goal with an angle",
+                key="goal",
+                hint="Give the angle that the plan ends with.",
             )
         if scene.pusher.fingers != 1:
             raise InputError(
@@ -146,7 +164,10 @@ class HorizonController(AbstractController[HorizonState]):
             raise InputError(f"no push of this scene can be steered. {reasons}")
         waits = 0.5 + latency if stale is None else stale
         prior = tuple(steering_of(planner.scene, option, EDGE) for option in planner.usable)
-        return cls(planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits)
+        around = Surroundings(planner.scene, planner.usable) if crowded else None
+        return cls(
+            planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits, surroundings=around
+        )
 
     @cached_property
     def observer(self) -> ContactObserver:
@@ -213,16 +234,16 @@ class HorizonController(AbstractController[HorizonState]):
             state = replace(state, failures=(0,) * len(cars), steering=self.prior, bounds=FrictionBounds())
             cars = self._usable(state)
         cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
+        if self.surroundings is not None:
+            return self._land_among(state, self.surroundings, cars, pose, text, time)
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
             why = "no push can be steered"
             if self.bounds is not None:
                 why += " where the bounds leave room for the finger"
             return replace(state, mode="done", outcome=why), self._standing(state)
-        k, target, length = found
-        place, car, hand = self.planner.usable[k].placement, cars[k], self.hand(state, time)
+        place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
-        assert car is not None
         try:
             here = relative(pose, hand)
             way = self.planner.transits.between(replace(place, pose=here, tips=here[None, :2]), place)
@@ -232,24 +253,76 @@ class HorizonController(AbstractController[HorizonState]):
             )
         stops = np.column_stack([compose(pose, way.poses), way.heights])[1:]
         stops[:, 2] = hand[2] + pose_error(stops[:, :3], hand)[:, 2]
+        return self._land(state, found, cars[found.push], pose, stops, text, time)
+
+    def _land_among(
+        self,
+        state: HorizonState,
+        around: Surroundings,
+        cars: list[ContactCar | None],
+        pose: Array,
+        text: str,
+        time: float,
+    ) -> tuple[HorizonState, Command]:
+        """Up, over and down to the next push among things; looks again, a few times, where there is none."""
+        seed = state.landings + LOOKS * state.stuck
+        found = around.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
+        if isinstance(found, str):
+            if state.stuck + 1 >= LOOKS:
+                return replace(state, mode="done", outcome=f"stopped, {text}: {found}"), self._standing(state)
+            again = replace(state, stuck=state.stuck + 1, frames=(), since=time, note=found)
+            return again, self._standing(state)
+        place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
+        assert place is not None
+        pusher = self.scene.pusher
+        contact = compose(pose, place.pose)
+        contact[2] = hand[2] + pose_error(contact, hand)[2]
+        before = compose(pose, compose(place.pose, [-pusher.approach, 0.0, 0.0]))
+        stops = np.array(
+            [
+                [*hand, pusher.lift],
+                [*before[:2], contact[2], pusher.lift],
+                [*before[:2], contact[2], 0],
+                [*contact, 0],
+            ]
+        )
+        return self._land(state, found, cars[found.push], pose, stops, text, time)
+
+    def _land(
+        self,
+        state: HorizonState,
+        found: Landing,
+        car: ContactCar | None,
+        pose: Array,
+        stops: Array,
+        text: str,
+        time: float,
+    ) -> tuple[HorizonState, Command]:
+        """On the way to the contact of a push, by stops X_WE and height, shape (n, 4)."""
+        option = self.planner.usable[found.push]
+        assert car is not None
+        assert option.placement is not None
         state = replace(
             state,
             phase="transit",
             stops=tuple(stops),
-            push=k,
-            target=target,
+            push=found.push,
+            target=found.target,
+            way=found.way,
+            passed=0,
+            stuck=0,
             frames=(pose,),
-            tip=place.tips[0],
+            tip=option.placement.tips[0],
             gap=0.0,
             car=car,
             landed=car.radius,
-            rest=length,
-            allowed=length + car.radius,
+            rest=found.length,
+            allowed=found.length + car.radius,
             landings=state.landings + 1,
             resumes=0,
             window=None,
         )
-        note = f"landing {state.landings} at {self.planner.usable[k].push.name}, {text}"
+        note = f"landing {state.landings} at {option.push.name}, {text}"
         return self._go(replace(state, note=note), time)
 
     def _usable(self, state: HorizonState) -> list[ContactCar | None]:
@@ -341,17 +414,28 @@ class HorizonController(AbstractController[HorizonState]):
         driven = self._driven(state, float(pose[2]), time)
         allowed = state.allowed - driven
         before = state.rest - driven
-        rest = rest_of_path(
-            flat,
-            goal,
-            car.radius,
-            m.left,
-            m.right,
-            before,
-            self.scene.pusher.speed * dt,
-            float(m.flat_point @ m.direction),
-            self.tolerance,
-        )
+        rest, place = None, None
+        if state.way is not None:
+            place = state.way.place(m, pose, state.passed)
+            if abs(place.off) > ASTRAY * car.radius or abs(place.skew) > SKEWED:
+                return self._retreat(state, time, f"{1000 * abs(place.off):.1f} mm off its way")
+            if not state.way.last or place.left > LAST * car.radius:
+                kappa = min(max(place.curvature(car.radius), -m.right), m.left)
+                rest = Rest(kappa, max(place.left, 0.0), "way" if place.left > 0 else "past")
+                before = place.left
+            state = replace(state, passed=place.passed)
+        if rest is None:
+            rest = rest_of_path(
+                flat,
+                goal,
+                car.radius,
+                m.left,
+                m.right,
+                before,
+                self.scene.pusher.speed * dt,
+                float(m.flat_point @ m.direction),
+                self.tolerance,
+            )
         if rest.how == "past" or allowed < 0:
             return self._retreat(state, time, "the end of this push")
         arm = m.arm
@@ -366,6 +450,9 @@ class HorizonController(AbstractController[HorizonState]):
         if self._leaves(m, pose, self.hand(state, time), velocity):
             ended = replace(self._failed(state), stopped=state.stopped + 1)
             return self._retreat(ended, time, "the push would leave the bounds")
+        if state.way is not None and not self._free(state, state.way, pose, speed, omega):
+            ended = replace(state, stopped=state.stopped + 1)
+            return self._retreat(ended, time, "the push would come too near to something")
         window = state.window
         if window is not None:
             window = replace(window, ratios=(*window.ratios, car.ratio(rest.curvature)))
@@ -373,11 +460,20 @@ class HorizonController(AbstractController[HorizonState]):
             state,
             mode="push",
             note=rest.how,
-            rest=rest.due(before),
+            rest=before if rest.how == "way" else rest.due(before),
             allowed=allowed,
             window=window,
             expected=pose,
         ), Command(velocity)
+
+    def _free(self, state: HorizonState, way: Way, pose: Array, speed: float, omega: float) -> bool:
+        """Whether object and finger stay clear until a hand comes to rest that goes on from X_WO like this."""
+        assert state.car is not None
+        assert state.tip is not None
+        assert self.surroundings is not None
+        rests = 1 / self.rate + 0.5 * speed / (BRAKE * self.scene.pusher.acceleration)
+        twist = rests * state.car.model.twist(speed, omega)
+        return self.surroundings.free(state.tip, pose, twist, GUARD * way.margin)
 
     def _driven(self, state: HorizonState, turn: float, time: float) -> float:
         """How far the flat point has come in the last tick [m]."""
@@ -435,11 +531,15 @@ class HorizonController(AbstractController[HorizonState]):
         angle = math.atan2(normal[1], normal[0]) + float(frame.object[2])
         hand, back = self.hand(state, time), self.scene.pusher.approach
         stop = np.array([hand[0] - back * math.cos(angle), hand[1] - back * math.sin(angle), hand[2], 0.0])
+        stops = (stop,)
+        if self.surroundings is not None:
+            away = self.surroundings.back(hand, angle)
+            stops = (np.array([*away, 0.0]), np.array([*away, self.scene.pusher.lift]))
         window = state.window
         if window is not None and state.car is not None:
             turned = float(predicted(frame, state.seen.told, time, state.car.model)[2])
             window = replace(self.observer.along(state, window, frame, hand, turned), hand=hand)
-        return self._go(replace(state, phase="retreat", stops=(stop,), note=why, window=window), time)
+        return self._go(replace(state, phase="retreat", stops=stops, note=why, window=window), time)
 
     def hand(self, state: HorizonState, time: float) -> Array:
         """X_WE at a `time` [s]: where the newest frame's log has it, and the commands since."""

@@ -11,6 +11,7 @@ from ..loop.controller import ControllerState
 from ..loop.measurement import Measurement
 from .contact_car import ContactCar
 from .push_knowledge import Steering
+from .way import Way
 
 Phase = Literal["look", "transit", "push", "resume", "retreat"]
 
@@ -49,6 +50,8 @@ class HorizonState(ControllerState):
             and its gap to the edge [m].
         car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
             allowed: it ends after this at the latest [m].
+        way, passed: of the push among things, and the number of its pose that was passed.
+        stuck: how often no way was found since the last.
         landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
             object or the finger would have left the bounds.
         failures: how often the finger slipped, or lost the edge too often, at every option.
@@ -69,6 +72,9 @@ class HorizonState(ControllerState):
     landed: float = np.inf
     rest: float = np.inf
     allowed: float = np.inf
+    way: Way | None = None
+    passed: int = 0
+    stuck: int = 0
     landings: int = 0
     resumes: int = 0
     stopped: int = 0

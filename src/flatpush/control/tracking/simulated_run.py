@@ -61,7 +61,11 @@ class TrackedRun:
             InputError: for a plan that cannot be followed so, and a centre of friction that is off the object.
         """
         run = self._slid(plan) if plan.slides else drive(*self.parts(plan), self.patience(plan), told=told)
-        return replace(run, outcome=touched(plan, run) or self.judged(plan, run.outcome, run.object[-1]))
+        return replace(
+            run,
+            outcome=touched(plan.scene, plan.on_table[0].fingers, run)
+            or self.judged(plan, run.outcome, run.object[-1]),
+        )
 
     def judged(self, plan: Plan, outcome: str, pose: Array) -> str:
         """The outcome of a run that ended with the object at X_WO: what the controller saw is one thing, where the
@@ -87,8 +91,9 @@ class TrackedRun:
         if not MultiPoint(scene.object.outline.polyline()).convex_hull.covers(Point(cof)):
             raise InputError("the centre of friction is off the object", key="centre", value=self.centre)
         plant = Plant(scene.object, first.fingers, scene.pusher.tip_radius, friction=self.friction, cof=cof)
-        # The pusher waits twice the approach distance behind the first contact, as planned.
-        hand = compose(first.pusher[0], [-2 * scene.pusher.approach, 0.0, 0.0])
+        # The pusher waits behind the first contact: at the approach distance where something may stand farther back.
+        room = 1 if scene.workspace.obstacles or scene.workspace.bounds is not None else 2
+        hand = compose(first.pusher[0], [-room * scene.pusher.approach, 0.0, 0.0])
         begin = scene.start_pose + np.array(self.start)
         return law, plant, begin, hand, SimulatedSensor(self.camera, np.random.default_rng(self.seed))
 

@@ -5,23 +5,25 @@ import shapely
 
 from ...geometry import transform
 from ...geometry.pose import Array
-from ...problem import Plan
+from ...problem import Scene
 from ..loop.closed_loop import ClosedLoopRun
 
 # Deeper than this counts [m]; circles are polygons to within a tenth of it.
 DEPTH = 1e-4
 
 
-def touched(plan: Plan, run: ClosedLoopRun) -> str:
+def touched(scene: Scene, fingers: Array, run: ClosedLoopRun) -> str:
     """What first touched an obstacle or went over the bounds in a run, and when; "" if nothing did.
 
     The object counts at every tick, fingertips while they are on the table.
+
+    Args:
+        fingers: centres of the fingertips in E, shape (k, 2) [m].
     """
-    scene = plan.scene
     bounds, obstacles = scene.workspace.bounds, scene.workspace.obstacles
     radius, down = scene.pusher.tip_radius, np.concatenate([[0.0], run.heights[:-1]]) == 0
     corners = transform(run.object[:, None], scene.object.outline.polyline(0.1 * DEPTH))
-    tips = transform(run.pusher[down][:, None], plan.on_table[0].fingers)
+    tips = transform(run.pusher[down][:, None], fingers)
     found: list[tuple[float, str]] = []
 
     def note(what: str, wrong: Array, times: Array) -> None:
