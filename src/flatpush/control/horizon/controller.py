@@ -230,8 +230,7 @@ class HorizonController(AbstractController[HorizonState]):
             return replace(state, mode="done", note=text, outcome=why), self._standing(state)
         cars = self._usable(state)
         if not any(cars):
-            # Better what failed than nothing: it may go well from here, and what was learned may be wrong.
-            state = replace(state, failures=(0,) * len(cars), steering=self.prior, bounds=FrictionBounds())
+            state = self._forgotten(state)
             cars = self._usable(state)
         cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         if self.surroundings is not None:
@@ -270,7 +269,7 @@ class HorizonController(AbstractController[HorizonState]):
         if isinstance(found, str):
             if state.stuck + 1 >= LOOKS:
                 return replace(state, mode="done", outcome=f"stopped, {text}: {found}"), self._standing(state)
-            again = replace(state, stuck=state.stuck + 1, frames=(), since=time, note=found)
+            again = replace(self._forgotten(state), stuck=state.stuck + 1, frames=(), since=time, note=found)
             return again, self._standing(state)
         place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
@@ -324,6 +323,10 @@ class HorizonController(AbstractController[HorizonState]):
         )
         note = f"landing {state.landings} at {option.push.name}, {text}"
         return self._go(replace(state, note=note), time)
+
+    def _forgotten(self, state: HorizonState) -> HorizonState:
+        """Better what failed than nothing: it may go well from here, and what was learned may be wrong."""
+        return replace(state, failures=(0,) * len(self.prior), steering=self.prior, bounds=FrictionBounds())
 
     def _usable(self, state: HorizonState) -> list[ContactCar | None]:
         """The cars of the pushes at their places, as far as is known now; None for those that are left out."""
@@ -531,7 +534,7 @@ class HorizonController(AbstractController[HorizonState]):
         angle = math.atan2(normal[1], normal[0]) + float(frame.object[2])
         hand, back = self.hand(state, time), self.scene.pusher.approach
         stop = np.array([hand[0] - back * math.cos(angle), hand[1] - back * math.sin(angle), hand[2], 0.0])
-        stops = (stop,)
+        stops: tuple[Array, ...] = (stop,)
         if self.surroundings is not None:
             away = self.surroundings.back(hand, angle)
             stops = (np.array([*away, 0.0]), np.array([*away, self.scene.pusher.lift]))

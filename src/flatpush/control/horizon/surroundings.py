@@ -9,6 +9,7 @@ import numpy as np
 
 from ...geometry import Outline, rotate, transform
 from ...geometry.collision import Body, World
+from ...geometry.collision.world import WorldArrays
 from ...geometry.pose import Array
 from ...planning.obstacles import Search, obstructions
 from ...planning.options import PushOption
@@ -46,7 +47,7 @@ class Surroundings:
         return World.of(self.scene.workspace.bounds, self.scene.workspace.obstacles)
 
     @cached_property
-    def _arrays(self) -> tuple[object, Body]:
+    def _arrays(self) -> tuple[WorldArrays, Body]:
         return self.world.arrays, Body.of(Outline.circle(max(self.scene.pusher.tip_radius, 1e-9)))
 
     def next_push(
