@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.broken_off import interrupts
 
 import flatpush as fp
 from flatpush.control import Camera, PlanController, SimulatedSensor
@@ -300,6 +301,12 @@ def test_a_robot_that_fails_while_it_is_stopped_leaves_a_log(tmp_path):
     assert rows.times[-1] == pytest.approx(0.5)
     assert np.median(np.diff(rows.times)) == pytest.approx(0.02)
     assert not np.any(rows.seen)
+
+
+@pytest.mark.parametrize("address", ["dry-run", "sim"])
+def test_an_interrupt_stops_in_every_phase(short_plan, tmp_path, address):
+    with open_robot(address, short_plan) as robot:
+        interrupts(robot, short_plan, tmp_path, 1e-9)
 
 
 def test_bags_hold_standard_messages(tmp_path):

@@ -7,6 +7,7 @@ from ctypes.util import find_library
 import numpy as np
 import pytest
 import shapely
+from tests.broken_off import interrupts
 
 import flatpush as fp
 from flatpush.execution import DONE, open_robot, run
@@ -126,6 +127,11 @@ def test_without_mujoco_one_line_says_so(short_plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(fp.MissingExtra, match=r'pip install "flatpush\[sim\]"'):
         open_robot("mujoco://tool", short_plan)
+
+
+def test_an_interrupt_stops_in_every_phase(short_plan, tmp_path):
+    with open_robot("mujoco://tool", short_plan) as robot:
+        interrupts(robot, short_plan, tmp_path, 1e-3)
 
 
 def test_the_cell_conforms(short_plan):

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.broken_off import PHASES, ends, interrupts
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
 from tests.waiting import started
@@ -89,6 +90,18 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
             robot.stop()
         assert "silent for 0.5 s" in ended.outcome
         assert 99 <= len(ended.cycles) <= 103
+
+
+@pytest.mark.slow
+def test_interrupts_and_ends_of_the_controller_stop_in_every_phase(three_feet, tmp_path):
+    pushes = (fp.Push("south", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(three_feet, (0.0, -0.03, 0.1), pusher=fp.Pusher(2, 0.018), pushes=pushes))
+    with Controller() as controller, robot_at(controller.host) as robot:
+        interrupts(robot, plan, tmp_path, 0.003)
+    for phase in PHASES:
+        with Controller() as controller, robot_at(controller.host, silence=0.5) as robot:
+            more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
+        assert 0 <= more <= 2, outcome
 
 
 CLIENT = """

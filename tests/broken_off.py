@@ -1,0 +1,82 @@
+"""Runs of a plan that are broken off in each of its phases: by an interrupt, or by the end of what a robot talks to."""
+
+import numpy as np
+import pytest
+
+from flatpush.documents import load_robot_log
+from flatpush.execution import DONE, run
+
+PHASES = ("travel", "landing", "push", "lift")
+
+
+def phase_of(cycle):
+    """What the tool does in a cycle, by its target."""
+    if "push" in cycle.leg:
+        return "push"
+    climb = float(cycle.target.twist[2])
+    return "lift" if climb > 0 else "landing" if climb < 0 else "travel"
+
+
+def in_phase(phase, act):
+    """What is to be told each cycle, so that something happens once, in the fifth cycle of a phase; and those told."""
+    cycles, there = [], []
+
+    def told(cycle):
+        cycles.append(cycle)
+        if phase_of(cycle) == phase:
+            there.append(len(cycles))
+            if len(there) == 5:
+                act()
+
+    return told, cycles, there
+
+
+def interrupts(robot, plan, folder, rest):
+    """Ctrl-C in every phase, on one robot that is entered: nothing more is sent, the tool rests, the log can be read.
+
+    Args:
+        rest: within this distance of where it was when it was stopped [m].
+    """
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    for phase in PHASES:
+        log = folder / f"{phase}.csv"
+        told, cycles, _ = in_phase(phase, interrupt)
+        sent = []
+        send = robot.send
+        robot.send = lambda target, sent=sent, send=send: (sent.append(target), send(target))[1]
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                run(plan, robot, log=log, told=told)
+        finally:
+            del robot.send
+        assert phase_of(cycles[-1]) == phase
+        assert len(sent) == len(cycles)
+        there = robot.state().pose
+        robot.clock.wait(robot.clock.now() + robot.limits.age)
+        rests = robot.state()
+        assert np.linalg.norm((rests.pose - there)[:3]) < rest
+        robot.clock.wait(robot.clock.now() + 10 * robot.limits.period)
+        assert np.allclose(robot.state().pose, rests.pose, atol=2e-5)
+        read(log, phase, "interrupted")
+
+
+def ends(robot, plan, folder, phase, kill):
+    """What a robot talks to ends in a phase; how many cycles the run goes on, and its outcome."""
+    log = folder / f"{phase}.csv"
+    told, _, there = in_phase(phase, kill)
+    ended = run(plan, robot, log=log, told=told)
+    assert ended.outcome != DONE
+    read(log, phase, ended.outcome)
+    return len(ended.cycles) - there[4], ended.outcome
+
+
+def read(log, phase, outcome):
+    """A log has rows from the landing on, and says how its run ended."""
+    text = log.read_text()
+    assert text.endswith(f"# ended: {outcome}\n")
+    assert "# 0.0" in text
+    if phase in ("push", "lift"):
+        assert len(load_robot_log(log).runs[0].times) > 0
