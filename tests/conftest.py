@@ -1,5 +1,6 @@
 """Objects and scenes that several tests use, and where the recorded data are."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -22,6 +23,12 @@ settings.register_profile("same draws", derandomize=True)
 # For tests/mutants.py, which asks only whether a test fails: the failing case need not be made small.
 settings.register_profile("not shrunk", derandomize=True, phases=[Phase.explicit, Phase.generate])
 settings.load_profile("same draws")
+
+
+def pytest_collection_finish():
+    """What is imported stays: going through it again and again in search of garbage is a part of every test's time."""
+    gc.freeze()
+    gc.set_threshold(20_000)
 
 
 @pytest.fixture(scope="session")

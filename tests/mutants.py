@@ -76,6 +76,8 @@ def survives(entry: dict[str, str], copy: Path, kernels: str) -> str:
         "-q",
         "-p",
         "no:cacheprovider",
+        "-m",
+        "slow or not slow",
         "--hypothesis-profile=not shrunk",
         *entry["test"].split(),
     ]

@@ -4,13 +4,14 @@ import json
 import signal
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import pytest
 from tests.waiting import started, until
 
 import flatpush as fp
 from flatpush.cli.app import app
-from flatpush.documents import load_robot_log
+from flatpush.documents import load_robot_log, mapping_of, parse_scene
 
 SCENE = """
 flatpush: scene/1
@@ -130,18 +131,25 @@ def test_nothing_real_moves_unless_somebody_says_so(files):
     assert "Traceback" not in told
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_signal_stops_the_robot_and_leaves_a_log(files, tmp_path, how):
-    log = tmp_path / "log.csv"
-    with start(files, "--yes", "--speed", "0.3", "--log", str(log)) as asked:
-        until(lambda: log.exists() and "segment 1" in log.read_text())
-        if how == signal.SIGKILL:
-            until(lambda: log.read_text().count("\n") >= 10)
-        asked.send_signal(how)
-        _, told = asked.communicate()
-    assert "Traceback" not in told
-    if how != signal.SIGKILL:
-        assert asked.returncode == 130
-        assert "stopped" in told
-        assert log.read_text().endswith("# ended: interrupted\n")
-    assert len(load_robot_log(log).runs[0].times) > 3
+def test_a_signal_stops_the_robot_and_leaves_a_log(files, tmp_path):
+    """Three at once, since each has to wait until its tool is at the object."""
+    plan = fp.plan(parse_scene(mapping_of(SCENE.replace("spacing: 18", "spacing: 18, speed: 4"))))
+    plan.save(tmp_path / "plan.json")
+    logs = {how: tmp_path / f"{how.name}.csv" for how in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)}
+    with ExitStack() as running:
+        asked = {
+            how: running.enter_context(start(tmp_path, "--yes", "--log", str(log)))
+            for how, log in logs.items()
+        }
+        for how, log in logs.items():
+            until(lambda log=log: log.exists() and "segment 1" in log.read_text())
+            until(lambda log=log: log.read_text().count("\n") >= 10)
+            asked[how].send_signal(how)
+        told = {how: one.communicate()[1] for how, one in asked.items()}
+    for how, log in logs.items():
+        assert "Traceback" not in told[how]
+        if how != signal.SIGKILL:
+            assert asked[how].returncode == 130
+            assert "stopped" in told[how]
+            assert log.read_text().endswith("# ended: interrupted\n")
+        assert len(load_robot_log(log).runs[0].times) > 3

@@ -113,6 +113,7 @@ def test_no_plan_of_a_search_is_below_the_bound_which_comes_near(kind):
     assert np.median(gaps) < 0.04
 
 
+@pytest.mark.slow
 def test_bounds_rise_and_end_where_nothing_is_left():
     rng = np.random.default_rng(5)
     fleet = random_fleet(rng, "dubins", 2)

@@ -67,7 +67,7 @@ def test_a_pose_has_the_clearance_that_shapely_measures(case) -> None:
 # Few obstacles are all looked at, many through the grid.
 @pytest.mark.parametrize(("least", "most"), [(0, 2), (5, 8)], ids=["few", "many"])
 @given(data=st.data())
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_a_path_has_the_least_clearance_of_dense_samples(least: int, most: int, data: st.DataObject) -> None:
     """The exact least clearance is at most that of any sample and at most half a step's way below the least of them."""
     world, body, start, step = data.draw(cases(least, most))
@@ -89,7 +89,7 @@ def test_a_path_has_the_least_clearance_of_dense_samples(least: int, most: int, 
 
 
 @given(st.one_of(cases(), cases(5, 8)))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_the_compiled_clearance_is_the_plain_one(case) -> None:
     world, body, start, step = case
     assume(pose_clearance(world, body, start) >= 0)

@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -103,6 +104,7 @@ def test_every_citation_is_resolved_on_one_page():
     assert used == listed
 
 
+@functools.cache
 def trees() -> dict[str, ast.Module]:
     """Dotted name of each module of flatpush → its syntax tree."""
     found = {}
@@ -114,19 +116,17 @@ def trees() -> dict[str, ast.Module]:
     return found
 
 
-TREES = trees()
-
-
 def imported(name: str) -> set[str]:
     """The modules of flatpush that one imports, at its top or within its functions, but not for types alone."""
-    tree, found = TREES[name], set()
+    tree, found = trees()[name], set()
+    nodes = list(ast.walk(tree))
     types_only = {
         id(inside)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
         for inside in ast.walk(node)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and id(node) not in types_only:
             home = name.split(".")
             if node.level:
@@ -136,23 +136,26 @@ def imported(name: str) -> set[str]:
             base = ".".join([*home, *(node.module or "").split(".")]).strip(".")
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
-                found.add(inner if inner in TREES else base)
-    return {other for other in found if other in TREES and other != name}
+                found.add(inner if inner in trees() else base)
+    return {other for other in found if other in trees() and other != name}
 
 
 def circles(edges: dict[str, set[str]]) -> set[frozenset[str]]:
     """The groups of more than one name, each of which reaches every other."""
-    reach = {a: set(b) for a, b in edges.items()}
-    for middle in edges:
-        for a in edges:
-            if middle in reach[a]:
-                reach[a] |= reach[middle]
+    reach: dict[str, set[str]] = {}
+    for a in edges:
+        found, ahead = set(), [a]
+        while ahead:
+            new = edges[ahead.pop()] - found
+            found |= new
+            ahead += new
+        reach[a] = found
     groups = {frozenset({a, *(b for b in reach[a] if a in reach[b])}) for a in edges}
     return {group for group in groups if len(group) > 1}
 
 
 def test_no_import_circle():
-    edges = {a: imported(a) for a in TREES}
+    edges = {a: imported(a) for a in trees()}
     # Plan.save is a one-line call, made when it is used; it is written in the import contract as well.
     edges["flatpush.problem.plan"].discard("flatpush.documents")
     edges["flatpush.problem.plan"].discard("flatpush.documents.plan_file")
@@ -161,7 +164,7 @@ def test_no_import_circle():
 
 
 def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
-    for name, tree in TREES.items():
+    for name, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
                 yield f"{name.removeprefix('flatpush.')}.{node.name}", node

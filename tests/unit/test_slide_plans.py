@@ -130,7 +130,9 @@ def test_listed_pushes_are_kept_to():
 
 
 def test_a_disc_that_nothing_turns_is_told():
-    asked = fp.Scene(fp.Object(Outline.circle(0.03), friction=0.0), (0.05, 0.0, 0.3))
+    surface = fp.Ellipsoid(np.diag([1.0, 1.0, 2000.0]))
+    disc = fp.Object(Outline.circle(0.03), friction=0.0, surface=surface)
+    asked = fp.Scene(disc, (0.05, 0.0, 0.3))
     refused = fp.plan(asked)
     assert refused.status == "no_plan"
     assert "no push of this finger turns the object" in refused.reason

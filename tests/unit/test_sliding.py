@@ -308,7 +308,8 @@ def test_slides_keep_clear_of_obstacles_and_bounds():
 
 def test_a_disc_that_no_push_turns_is_refused():
     """Pushed through its centre it never turns; asked for the heading it has, it is pushed."""
-    disc = fp.Object(Outline.circle(0.03), friction=0.0)
+    surface = fp.Ellipsoid(np.diag([1.0, 1.0, 2000.0]))
+    disc = fp.Object(Outline.circle(0.03), friction=0.0, surface=surface)
     planner = SlidePlanner(Plant(disc, [[0.0, 0.0]], 0.0025))
     refused = planner.plan([0.05, 0.0, 0.3], np.zeros(3))
     assert refused.status == "no_plan"
