@@ -3,12 +3,15 @@
 Two fingers, open loop. Every run begins beside its nominal start as the recorded ones did: their offsets have the
 standard deviations OFF. A push of two fingers takes out errors of the angle and across the fingers, not along them. So
 the last push goes straight to the goal, where late contact costs nothing, and what comes before it pushes sides at
-right angles to that one. Support and outline are as stated for the paper's objects; the feet of Fig. 6 are not known.
+right angles to that one. Not every pair of such plans bears starts that are off: fingers go over the crests of a curved
+side. So the contact simulator tries a pair before the cell does. Support and outline are as stated for the paper's
+objects; the feet of Fig. 6 are not known.
 """
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from time import process_time
 
@@ -24,11 +27,15 @@ from ..geometry.pose import Array
 from ..planning import plan
 from ..planning.options import push_option
 from ..problem import Plan, Planning, Push, Pusher, Scene
+from ..simulation.rollout import roll
 from .feedback import objects
 
 # Standard deviations of the start in 41 recorded runs, over both axes [m], and of its angle [rad].
 OFF = (0.001, float(np.deg2rad(1.2)))
 RUNS, SEED = 5, 0
+# Starts with which plans are tried in the contact simulator, so many at once; plans that bring these to more than
+# HOPELESS times the tolerance are tried no further.
+TRIED, AT_ONCE, HOPELESS = 12, 4, 3.0
 # Two fingers land this far before the object, because it may be so far from where it should be [m].
 APPROACH = 0.005
 # The last push is so long [m]; normals of sides at right angles to it have at most this cosine between them.
@@ -95,11 +102,30 @@ class Case:
 
 
 def plans(figure: str, start: tuple[float, float, float]) -> tuple[Plan, Plan]:
-    """The two cheapest plans: to before the goal, and straight to it by another side.
+    """Two plans: to before the goal, and straight to it by another side.
+
+    The cheapest that bring starts that are off to within the goal's tolerance on average, in the contact simulator;
+    where none do, those that come nearest.
 
     Raises:
         InputError: if there are none.
     """
+    found = pairs(figure, start)
+    if not found:
+        raise InputError(f"no plan for {figure} from {start}")
+    best, least = found[0], np.inf
+    for both in found:
+        far = expected(both)
+        if far <= 1:
+            return both
+        if far < least:
+            best, least = both, far
+    return best
+
+
+@lru_cache(maxsize=len(STARTS))
+def pairs(figure: str, start: tuple[float, float, float]) -> tuple[tuple[Plan, Plan], ...]:
+    """Plans to before the goal and straight to it, by every side that can, cheapest first."""
     thing, places = objects()[list(STARTS).index(figure)]
     pushes = {name: Push(name, thing.outline.nearest(place), 2, 0.018) for name, place in places.items()}
     pose = (start[0] / 1000, start[1] / 1000, float(np.deg2rad(start[2])))
@@ -119,9 +145,27 @@ def plans(figure: str, start: tuple[float, float, float]) -> tuple[Plan, Plan]:
         last = plan(Scene(thing, before, GOAL, pusher, (push,), planning=planning))
         if first.status == last.status == "solved":
             found.append((first, last))
-    if not found:
-        raise InputError(f"no plan for {figure} from {start}")
-    return min(found, key=lambda both: both[0].cost + both[1].cost)
+    return tuple(sorted(found, key=lambda both: both[0].cost + both[1].cost))
+
+
+def expected(both: tuple[Plan, ...], runs: int = TRIED, seed: int = SEED) -> float:
+    """How far off the goal starts that are off end on average in the contact simulator, in parts of the tolerance."""
+    noise = np.array([OFF[0], OFF[0], OFF[1]])
+    starts = both[0].scene.start_pose + noise * np.random.default_rng(seed).standard_normal((runs, 3))
+    errors = np.zeros((0, 3))
+    mean = 0.0
+    for k in range(0, runs, AT_ONCE):
+        poses = starts[k : k + AT_ONCE]
+        for one in both:
+            poses = roll(
+                one, [replace(one.scene, start=tuple(pose)) for pose in poses], "exact", "arcs"
+            ).final
+        errors = np.concatenate([errors, [pose_error(pose, GOAL) for pose in poses]])
+        off = np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), np.abs(errors[:, 2])])
+        mean = float(np.max(off.mean(axis=0) / both[-1].scene.planning.goal_tolerance[1:]))
+        if mean > HOPELESS:
+            break
+    return mean
 
 
 def cases(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[Case]:
