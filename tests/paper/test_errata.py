@@ -1,4 +1,4 @@
-"""docs/errata.md, rows 2 and 11 to 15: what is computed holds, and what is printed does not."""
+"""docs/errata.md, rows 2 to 6, 8 and 11 to 15: what is computed holds, and what is printed does not."""
 
 import csv
 import re
@@ -40,6 +40,52 @@ def test_row_2_the_acceleration_of_the_reference_is_fed_forward_not_its_velocity
     feedback = -kp * (0.0 - z_d) - kd * (SPEED * rotate(HEADING, [1.0, 0.0]) - dz_d)
     np.testing.assert_allclose(found, ddz_d + feedback, atol=1e-7)
     assert np.hypot(*(found - (dz_d + feedback))) > 0.5 * SPEED  # as printed
+
+
+A, B, R, MU = 1.3, 2400.0, 0.021, 0.45  # of the paper's matrix and contact [m]
+MATRIX = Ellipsoid(np.diag([A, A, B]))
+BELOW = PointContact([0.0, -R], [0.0, 1.0], MU)
+
+
+def test_rows_3_to_5_rotation_centre_unit_of_length_and_distance_of_the_line_of_force() -> None:
+    force = np.array([0.3, 1.0])
+    V = MATRIX.twist(BELOW.wrench(force))
+
+    def velocity(point: np.ndarray) -> float:
+        return float(np.hypot(V[0] - V[2] * point[1], V[1] + V[2] * point[0]))
+
+    centre, printed = np.array([-V[1], V[0]]) / V[2], V[:2] / V[2]
+    assert velocity(centre) == pytest.approx(0, abs=1e-12)
+    assert velocity(printed) > 0.5 * np.hypot(*V[:2])
+    # In millimetres b is a millionth of itself: a length grows a thousandfold.
+    in_mm = flat_output(PointContact([0.0, -1000 * R], [0.0, 1.0], MU), Ellipsoid(np.diag([A, A, B / 1e6])))
+    assert in_mm.min_radius == pytest.approx(1000 * flat_output(BELOW, MATRIX).min_radius)
+    assert np.sqrt(A / (B / 1e6)) == pytest.approx(1000 * np.sqrt(A / B))
+    assert pytest.approx(1000 * A / B) != A / (B / 1e6)  # as printed
+    lever = abs(R * force[0]) / np.hypot(*force)
+    assert lever * np.hypot(*centre) == pytest.approx(A / B)
+    assert R * np.hypot(*centre) > 2 * A / B  # as printed
+
+
+def test_row_6_the_heading_backwards_is_not_that_forwards() -> None:
+    flat = flat_output(BELOW, MATRIX)
+    for dz in np.array([[0.01, 0.02], [0.01, -0.02], [-0.01, -0.02]]):
+        (_, _, theta), _ = flat.recover(np.zeros(2), dz, np.zeros(2))
+        np.testing.assert_allclose(rotate(theta, [0.0, 1.0]), dz / np.hypot(*dz), atol=1e-12)
+        printed = np.arctan(-dz[0] / dz[1])
+        assert (np.cos(printed - theta) > 0) == (dz[1] > 0)
+    with pytest.raises(ValueError, match="zero"):
+        flat.recover(np.zeros(2), np.zeros(2), np.zeros(2))
+
+
+def test_row_8_the_cone_stands_on_the_normal_of_the_contact() -> None:
+    leaning = PointContact([0.0, -R], rotate(0.3, [0.0, 1.0]), MU)
+    for angle, sticks in ((0.3 + 0.3, True), (-0.3, False)):  # of the force, from the direction to the COF
+        force = rotate(angle, [0.0, 1.0])
+        V = MATRIX.twist(leaning.wrench(force))
+        u = np.array([V[0] + V[2] * R, V[1]])  # of the contact
+        assert (leaning.motion(MATRIX, u).mode == "sticking") is sticks
+        assert (abs(force[0]) <= MU * force[1]) is not sticks  # as printed
 
 
 def test_row_11_the_law_is_not_linear_at_rest_nor_outside_the_cone() -> None:

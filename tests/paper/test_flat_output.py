@@ -128,7 +128,11 @@ def test_proposition_1_duality():
     rng = np.random.default_rng(1)
     for _ in range(50):
         p = rotate(rng.uniform(-3, 3), [0.0, -rng.uniform(0.005, 0.05)])
-        contact = PointContact(p, rotate(rng.uniform(-1.2, 1.2), -p), 0.8)
+        tilt = rng.uniform(-1.2, 1.2)
+        contact = PointContact(p, rotate(tilt, -p), 0.8)
+        if abs(np.tan(tilt)) < 0.79:  # it can steer
+            axle = flat_output(contact, PAPER).flat_point
+            assert float(axle @ -p / np.hypot(*p)) == pytest.approx(rho / np.hypot(*p))
         for force in in_cone(contact, rng, 5):
             c = centre(contact, PAPER, force)
             assert float(c @ -p / np.hypot(*p)) == pytest.approx(rho / np.hypot(*p))
@@ -216,6 +220,8 @@ def test_theorem_1_any_point_of_the_line():
         inside = middle.c_right + rng.uniform(0, 1) * (middle.c_left - middle.c_right)
         for along in (None, inside) + (0.0,) * (middle.c_right <= 0 <= middle.c_left):
             flat = flat_output(contact, surface, along)
+            aside = (middle.along if along is None else along) - middle.along
+            assert np.hypot(*(flat.flat_point - middle.flat_point)) == pytest.approx(abs(aside), abs=1e-12)
             poses, forces = rng.uniform(-2, 2, (8, 3)), in_cone(contact, rng, 8)
             found, found_forces = flat.recover(
                 *flat_motion(contact, surface, flat, poses, forces, rng.normal(size=(8, 2)))

@@ -85,6 +85,34 @@ def test_every_file_and_test_that_the_documents_name_exists():
     assert not missing
 
 
+# Rows of docs/equations.md whose tests are slow, read recorded data, or that have nothing to compute: it only shrinks.
+UNBROKEN = {
+    "Fig. 5",
+    "Sec. 5.1, many pushes",
+    "Sec. 5.2, Figs. 10–11",
+    "Sec. 6, future work",
+    "Eq. 1 under an unknown force",
+    "a side at rest against both fingers",
+}
+
+
+def test_every_row_of_the_equations_has_a_change_that_its_own_test_must_notice():
+    broken = (ROOT / "tests" / "mutants" / "equations.yaml").read_text(encoding="utf-8")
+    named = set(re.findall(r'^  test: "(.*)"', broken, re.M))
+    table = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines() if "`tests/" in line
+    ]
+    rows = [row for row in rows if len(row) == 4]
+    assert len(rows) > 35
+    unbroken = set()
+    for name, _, _, tests in rows:
+        own = re.findall(r"`(tests/[^`]+)`", tests)
+        if not any(test == one or test.startswith(f"{one}::") for test in named for one in own):
+            unbroken.add(name)
+    assert unbroken == UNBROKEN
+
+
 def test_no_sentence_of_the_documents_is_cut():
     """Brackets and emphasis close within their paragraph, item or row."""
     cut = []
