@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .rollout_file import save_rollouts
     from .rows import BadRow
     from .runs_file import save_runs
-    from .scene_reader import load_scene, parse_scene
+    from .scene_reader import load_scene, parse_ends, parse_scene
     from .scene_writer import scene_document
     from .schema import plan_schema, scene_schema
     from .surface_file import load_surface, save_surface
@@ -51,6 +51,7 @@ __all__ = [
     "mapping_of",
     "outline_note",
     "own_columns",
+    "parse_ends",
     "parse_plan",
     "parse_scene",
     "plan_document",
@@ -94,6 +95,7 @@ _HOME = {
     "mapping_of": "reading",
     "outline_note": "outline_reader",
     "parse_plan": "plan_file",
+    "parse_ends": "scene_reader",
     "parse_scene": "scene_reader",
     "plan_document": "plan_file",
     "plan_schema": "schema",

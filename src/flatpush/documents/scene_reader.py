@@ -84,6 +84,19 @@ def parse_scene(
     return _scene(Context(source, key, raw, PER_METRE[model.units.length], model.units.angle == "deg"), model)
 
 
+def parse_ends(document: Mapping[str, object]) -> tuple[Array, Array]:
+    """Start and goal of a mapping as parse_scene reads it, X_WO of shape (3,); a free angle of the goal is nan.
+
+    Raises:
+        InputError: as parse_scene, but not for what only an outline, a support or places of pushes can be wrong in.
+    """
+    _check_lengths(document, "", "")
+    raw = _checked_version(plain(document, "", ""), "", "")
+    model = checked(m.SceneModel, raw, "", "")
+    ctx = Context("", "", raw, PER_METRE[model.units.length], model.units.angle == "deg")
+    return _pose(ctx, model.start, "start"), _goal(ctx, model.goal)
+
+
 def _merged(document: Any, changes: Mapping[str, object]) -> Any:
     result = dict(document)
     for key, value in changes.items():

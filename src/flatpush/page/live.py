@@ -9,8 +9,9 @@ from itertools import islice
 import numpy as np
 
 from ..compiling import clock
-from ..documents import parse_scene
+from ..documents import parse_ends, parse_scene
 from ..errors import FlatpushError
+from ..geometry.pose import Array
 from ..planning import Planner
 from ..planning.among_obstacles import Progress
 from ..planning.assembly import assemble, car_of
@@ -53,17 +54,17 @@ class LivePlanner:
         Raises:
             InputError: for a document that is no scene, or a start or a goal where something is in the way.
         """
-        scene = parse_scene(document)
-        yield from self._prepared(document, scene).answers(scene, progress)
+        known = self._prepared(document)
+        yield from known.answers(known.moved(document), progress)
 
     def listed(self, document: Mapping[str, object]) -> Scene:
         """A scene with its pushes listed; errors as in answers."""
-        return self._prepared(document, parse_scene(document)).scene
+        return self._prepared(document).moved(document)
 
-    def _prepared(self, document: Mapping[str, object], scene: Scene) -> "_Prepared":
+    def _prepared(self, document: Mapping[str, object]) -> "_Prepared":
         key = json.dumps({k: v for k, v in document.items() if k not in ("start", "goal")}, sort_keys=True)
         if key not in self._known:
-            self._known[key] = _Prepared(scene)
+            self._known[key] = _Prepared(document)
             while len(self._known) > KEPT:
                 self._known.popitem(last=False)
         self._known.move_to_end(key)
@@ -73,13 +74,19 @@ class LivePlanner:
 class _Prepared:
     """The pushes of a scene, and the last sequence of them that was best."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, document: Mapping[str, object]) -> None:
+        scene = parse_scene(document)
         self._planner = Planner(scene)
+        if self._planner.usable:
+            _ = self._planner.fleet  # worked out here once, for all that are moved
         self._seed: Candidate | None = None
+        # A far outline is moved to its origin, and with it what poses mean.
+        self._in_place = np.array_equal(parse_ends(document)[0], scene.start)
 
-    @property
-    def scene(self) -> Scene:
-        return self._planner.scene
+    def moved(self, document: Mapping[str, object]) -> Scene:
+        """The scene, pushes listed, of a document that differs in start and goal alone."""
+        start, goal = parse_ends(document) if self._in_place else _ends(parse_scene(document))
+        return replace(self._planner.scene, start=start, goal=goal)
 
     def answers(
         self, scene: Scene, progress: Progress | None
@@ -149,6 +156,10 @@ class _Prepared:
         if len(path.pushes) > 1:
             poses = np.array([path.start, *(end for *_, end in path.stretches)])
             self._seed = Candidate(path.cost, np.array(path.pushes, dtype=np.int64), poses)
+
+
+def _ends(scene: Scene) -> tuple[Array, Array]:
+    return scene.start_pose, scene.goal_pose
 
 
 def _plan(planner: Planner, path: Path, began: float) -> Plan:

@@ -7,7 +7,7 @@ import pytest
 from tests.live_pages import CAMERA
 
 import flatpush as fp
-from flatpush.documents import parse_plan
+from flatpush.documents import parse_plan, parse_scene
 from flatpush.errors import InputError
 from flatpush.page.feedback import Followed
 from flatpush.page.files import saved
@@ -35,6 +35,23 @@ def test_the_last_sequence_of_pushes_follows_the_start(planner, document):
     assert [push.push for push in plan.pushes] == [push.push for push in best.pushes]
     assert abs(plan.cost - best.cost) < 0.004
     np.testing.assert_allclose(plan.scene.goal_error(plan.final_pose()), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e5])  # an outline drawn far from its origin is moved there
+def test_a_start_and_a_goal_that_are_moved_are_those_of_the_document(document, away):
+    document["object"]["outline"] = [[x + away, y] for x, y in document["object"]["outline"]]
+    document["pushes"] = [{"name": "long edge", "at": [away, -10]}]
+    document["start"], document["goal"] = [-120 - away, 60, 0], [-away, 0, 0]
+    planner = LivePlanner()
+    planner.listed(document)
+    document["start"], document["goal"] = [-100 - away, 50, 20], [-away, 5, 10 if away else "free"]
+    moved, read = planner.listed(document), parse_scene(document)
+    np.testing.assert_allclose(moved.start, read.start, atol=1e-12)
+    np.testing.assert_allclose(moved.goal, read.goal, atol=1e-12)
+    assert moved.object.outline.radius_about((0.0, 0.0)) < 1.0
+    document["start"] = [0, 0, 1000]
+    with pytest.raises(InputError, match="two turns"):
+        planner.listed(document)
 
 
 def test_a_start_on_an_obstacle_is_refused_with_its_place(planner, document):

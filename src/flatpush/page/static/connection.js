@@ -73,8 +73,8 @@ export class Connection extends EventTarget {
         if (message.kind === "plan") message.stamp = this.current.stamp;
         if (message.kind === "superseded" && !this.wanted) this.wanted = this.last;
       }
+      this.push();   /* before the answer is drawn: the next one is planned meanwhile */
       if (current) this.tell(message.kind, message);
-      this.push();
     } else this.tell(message.kind, message);
   }
 }

@@ -82,7 +82,10 @@ export function turned(pose, outline, degrees) {
   return [rounded(here[0] - shift[0], 3), rounded(here[1] - shift[1], 3), angle];
 }
 
-export const set = (node, values) => { for (const key in values) node.setAttribute(key, values[key]); };
+/* What is the same stays untouched: whatever is written is laid out again. */
+export const set = (node, values) => { for (const key in values) if (node.getAttribute(key) !== String(values[key])) node.setAttribute(key, values[key]); };
+
+export const say = (node, text) => { if (node.textContent !== text) node.textContent = text; };
 
 export function svg(name, values = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);

@@ -3,6 +3,7 @@
 import { RAD, arrow, centroid, corners, find, number, path, radians, set, size } from "./geometry.js";
 
 const MOST = 20000;   /* rows of a recorded run */
+const SOON = 15;      /* between two steps of the finger [ms] */
 
 export class Hand {
   constructor(model, table, connection) {
@@ -43,6 +44,10 @@ export class Hand {
   tick() {
     if (!this.on) return;
     requestAnimationFrame(() => this.tick());
+    this.step();
+  }
+
+  step() {
     const now = performance.now();
     if (!this.target || this.waiting || !this.connection.open) return;
     const from = this.finger || this.target, still = Math.hypot(from[0] - this.target[0], from[1] - this.target[1]) < 1e-4;
@@ -71,6 +76,7 @@ export class Hand {
     const middle = centroid(this.model.scene.object.outline), at = this.object;
     const here = [at[0] + Math.cos(at[2]) * middle[0] - Math.sin(at[2]) * middle[1], at[1] + Math.sin(at[2]) * middle[0] + Math.cos(at[2]) * middle[1]];
     this.trail.push(here);
+    if (performance.now() - this.last >= SOON) this.step();   /* drawing took longer than a frame: the plant goes on meanwhile */
     if (this.finger && this.rows.length < MOST) this.rows.push([(performance.now() - this.began) / 1000, this.object, [...this.finger, 0], answer.mode]);
     this.draw(answer);
     find("hint").textContent = words(answer);

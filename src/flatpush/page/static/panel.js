@@ -1,6 +1,6 @@
 /* What stands beside the table: the plan in numbers, the poses, and sliders with numbers. */
 
-import { find, html, number, rounded } from "./geometry.js";
+import { find, html, number, rounded, say } from "./geometry.js";
 
 const MODELS = ["exact", "ellipsoid", "local", "quartic"], COSTS = ["flat", "pusher", "time"];
 
@@ -107,28 +107,34 @@ export class Panel {
   /* The numbers of an answer. */
   tell(plan) {
     const solved = plan.status === "solved";
-    document.title = find("title").textContent = plan.title || `${this.model.scene.object.name}: no plan`;
-    find("subtitle").textContent = solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0];
-    const cost = solved ? plan.cost.split(" (")[0] : "–";
-    const count = solved ? plan.traces.length : 0;
-    find("cost").textContent = cost;
-    find("duration").textContent = solved ? number(plan.duration, 1) + " s" : "–";
-    find("count").textContent = solved ? String(count) : "–";
-    if (!plan.planning_time) find("spent").textContent = plan.stored ? "stored" : "–";
-    else find("spent").textContent = plan.planning_time < 1 ? number(1000 * plan.planning_time, 0) + " ms" : number(plan.planning_time, 1) + " s";
+    document.title = plan.title || `${this.model.scene.object.name}: no plan`;
+    say(find("title"), document.title);
+    say(find("subtitle"), solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0]);
+    const spent = plan.planning_time;
+    say(find("cost"), solved ? plan.cost.split(" (")[0] : "–");
+    say(find("duration"), solved ? number(plan.duration, 1) + " s" : "–");
+    say(find("count"), solved ? String(plan.traces.length) : "–");
+    say(find("spent"), !spent ? (plan.stored ? "stored" : "–") : spent < 1 ? number(1000 * spent, 0) + " ms" : number(spent, 1) + " s");
     find("reason").hidden = solved;
-    find("reason").textContent = solved ? "" : plan.reason;
-    const rows = (plan.traces || []).map((trace, k) => {
-      const button = html("button", { type: "button", "data-push": k }, html("i", { style: `--c:${trace.colour}` }, String(k + 1)), html("b", {}, trace.name), html("span", {}, trace.word));
-      button.addEventListener("click", () => { this.model.select(`push:${k}`); this.player.jumpTo(k); });
-      return html("li", {}, button);
-    });
-    find("pushes").replaceChildren(...rows);
+    say(find("reason"), solved ? "" : plan.reason);
+    this.list(plan.traces || []);
     const proved = find("proved");
     /* Margins come a moment after the path; the old ones stay meanwhile, pale. */
     if (solved && plan.proved.length) proved.replaceChildren(...plan.proved.flatMap(([name, value]) => [html("dt", {}, name), html("dd", {}, value)]));
     else if (!solved) proved.replaceChildren();
     proved.classList.toggle("stale", solved && !plan.proved.length);
     if (!solved || plan.proved.length) find("warnings").replaceChildren(...(plan.warnings || []).map((text) => html("li", {}, text)));
+  }
+
+  /* The pushes, as buttons; while something is dragged they are mostly the same ones. */
+  list(traces) {
+    const told = JSON.stringify(traces.map(({ name, word, colour }) => [name, word, colour]));
+    if (told === this.listed) return;
+    this.listed = told;
+    find("pushes").replaceChildren(...traces.map((trace, k) => {
+      const button = html("button", { type: "button", "data-push": k }, html("i", { style: `--c:${trace.colour}` }, String(k + 1)), html("b", {}, trace.name), html("span", {}, trace.word));
+      button.addEventListener("click", () => { this.model.select(`push:${k}`); this.player.jumpTo(k); });
+      return html("li", {}, button);
+    }));
   }
 }

@@ -1,6 +1,6 @@
 /* The plan in motion: a timeline to scrub and to play. */
 
-import { RAD, centroid, corners, find, html, number, path, place, set, size, svg } from "./geometry.js";
+import { RAD, centroid, corners, find, html, number, path, place, say, set, size, svg } from "./geometry.js";
 
 export class Player {
   constructor(model) {
@@ -51,12 +51,14 @@ export class Player {
   }
 
   strip() {
-    find("strip").replaceChildren(...this.motion.segments.map((segment, k, all) => {
-      const end = k + 1 < all.length ? all[k + 1].start : this.duration, part = html("span");
+    const strip = find("strip"), all = this.motion.segments;
+    while (strip.children.length > all.length) strip.lastChild.remove();
+    while (strip.children.length < all.length) strip.append(html("span"));
+    all.forEach((segment, k) => {
+      const end = k + 1 < all.length ? all[k + 1].start : this.duration, part = strip.children[k];
       part.style.flex = (end - segment.start) + " 0 0";
       part.style.background = segment.push === null ? "transparent" : segment.colour;
-      return part;
-    }));
+    });
   }
 
   /* The sample after the time t; where two segments meet, of the later one. */
@@ -105,8 +107,8 @@ export class Player {
       const at = (x, y) => (centre[0] + x) + " " + (centre[1] + y);
       set(sign, { d: "M" + at(-d, 0) + "L" + at(d, 0) + (turn.turn === "left" ? "M" + at(0, -d) + "L" + at(0, d) : "") });
     }
-    find("time").textContent = number(this.now, 2) + " s of " + number(this.duration, 2) + " s";
-    find("mode").textContent = describe(segment, turn, height);
+    say(find("time"), number(this.now, 2) + " s of " + number(this.duration, 2) + " s");
+    say(find("mode"), describe(segment, turn, height));
     find("scrub").value = this.duration > 0 ? 1000 * this.now / this.duration : 0;
     set(find("scrub"), { "aria-valuetext": find("time").textContent + ", " + find("mode").textContent });
     this.pushing = pushing && turn ? { push: segment.number - 1, arc: segment.turns.indexOf(turn) } : null;

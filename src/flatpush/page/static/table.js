@@ -15,10 +15,12 @@ export class Table {
     this.sketch = null;                    /* corners of an outline that is being drawn */
     this.touched = false;                  /* whether somebody has looked elsewhere */
     this.latencies = [];
+    this.frame = this.node.getBoundingClientRect();   /* asked for only when it changes: asking lays the page out */
     model.addEventListener("loaded", () => { this.touched = false; this.fit(); });
     model.addEventListener("changed", () => this.drawScene());
     model.addEventListener("selected", () => this.drawScene());
-    new ResizeObserver(() => this.touched ? this.look() : this.fit()).observe(this.node);
+    new ResizeObserver(() => { this.measure(); if (this.touched) this.look(); else this.fit(); }).observe(this.node);
+    window.addEventListener("scroll", () => this.measure());
     this.node.addEventListener("pointerdown", (event) => this.down(event));
     this.node.addEventListener("pointermove", (event) => this.move(event));
     this.node.addEventListener("pointerup", (event) => this.up(event));
@@ -36,9 +38,11 @@ export class Table {
 
   /* ---- how it is looked at ---- */
 
-  get wide() { return this.node.clientWidth || 1; }
+  measure() { this.frame = this.node.getBoundingClientRect(); }
 
-  get high() { return this.node.clientHeight || 1; }
+  get wide() { return this.frame.width || 1; }
+
+  get high() { return this.frame.height || 1; }
 
   fit() {
     const { scene, plan } = this.model;
@@ -88,8 +92,7 @@ export class Table {
   }
 
   at(event) {
-    const frame = this.node.getBoundingClientRect();
-    return this.world([event.clientX - frame.left, event.clientY - frame.top]);
+    return this.world([event.clientX - this.frame.left, event.clientY - this.frame.top]);
   }
 
   /* ---- what is drawn ---- */
@@ -252,8 +255,7 @@ export class Table {
       if (this.pointers.size < 2) return;
       const now = this.pinch(), factor = drag.apart / Math.max(now.apart, 1);
       this.view = { ...drag.view };
-      const frame = this.node.getBoundingClientRect();
-      this.zoom(factor, [drag.middle[0] - frame.left, drag.middle[1] - frame.top]);
+      this.zoom(factor, [drag.middle[0] - this.frame.left, drag.middle[1] - this.frame.top]);
       this.view.x -= (now.middle[0] - drag.middle[0]) * this.view.unit;
       this.view.y += (now.middle[1] - drag.middle[1]) * this.view.unit;
       this.look();
