@@ -3,6 +3,7 @@
 import shutil
 
 import pytest
+from tests.extras import extra
 from tests.live_server import EXAMPLES, Served
 
 
@@ -16,7 +17,7 @@ def server():
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     """Chromium without a window; what it saves goes to the folder `downloads`."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
+    webdriver = pytest.importorskip("selenium.webdriver", reason=extra("test"))
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if program is None or driver is None:
         pytest.skip("no browser: needs chromium and chromedriver (Debian: chromium, chromium-driver)")

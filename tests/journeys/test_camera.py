@@ -7,9 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
-pytest.importorskip("cv2", reason="the extra vision is not installed")
-pytest.importorskip("pyapriltags", reason="the extra vision is not installed")
+pytest.importorskip("cv2", reason=extra("vision"))
+pytest.importorskip("pyapriltags", reason=extra("vision"))
 
 import cv2
 

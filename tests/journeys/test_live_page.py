@@ -9,12 +9,13 @@ import time
 
 import numpy as np
 import pytest
+from tests.extras import extra
 from tests.live_server import PATIENCE, Served
 from tests.waiting import until
 
 pytestmark = pytest.mark.slow
-pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
-pytest.importorskip("starlette", reason="the server is in the extra `page`")
+pytest.importorskip("uvicorn", reason=extra("page"))
+pytest.importorskip("starlette", reason=extra("page"))
 
 DESK, TABLET = (1280, 720), (820, 1180)
 

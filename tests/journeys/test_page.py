@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.view import save_figure
 
 pytestmark = pytest.mark.slow
-pytest.importorskip("selenium.webdriver", reason="selenium is in the extra `test`")
+pytest.importorskip("selenium.webdriver", reason=extra("test"))
 DESK, PHONE = (1280, 720), (390, 844)
 TRIANGLE = 1e-3 * np.array([[19.667, -9.5], [19.667, 19.0], [-39.333, -9.5]])
 

@@ -8,12 +8,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from tests.extras import extra
 from tests.live_server import COMMAND, PATIENCE, Served
 from tests.waiting import until
 
 pytestmark = pytest.mark.slow
-pytest.importorskip("uvicorn", reason="the server is in the extra `page`")
-pytest.importorskip("starlette", reason="the server is in the extra `page`")
+pytest.importorskip("uvicorn", reason=extra("page"))
+pytest.importorskip("starlette", reason=extra("page"))
 
 
 @pytest.fixture

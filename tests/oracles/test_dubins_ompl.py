@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 from flatpush.steering.dubins import DubinsPath, shortest_length, shortest_path
 
-base = pytest.importorskip("ompl.base", reason="OMPL is not installed")
+base = pytest.importorskip("ompl.base", reason=extra("test"))
 
 RANDOM_PAIRS = 100_000
 DEGENERATE_PAIRS = [2_000, pytest.param(10_000, marks=pytest.mark.slow)]

@@ -2,20 +2,16 @@
 
 import csv
 import json
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 from flatpush.friction import Exact, Support, fit_ellipsoid, fit_quartic
 from flatpush.friction.report import twist_angles
 from flatpush.friction.sos import minors, tensors
 
-DATA = Path(os.environ.get("FLATPUSH_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
-needs_data = pytest.mark.skipif(
-    not (DATA / "plan_graph").is_dir(), reason="recorded data not found: set FLATPUSH_DATA to its folder"
-)
 OLD = {"regularisation": 0.1, "force_weight": 2.0, "velocity_weight": 1.0}  # the paper's toolbox
 
 
@@ -43,7 +39,6 @@ def sampled(
     return np.array(wrenches), np.array(twists)
 
 
-@needs_data
 @pytest.mark.parametrize(
     ("case", "points", "stored"),
     [
@@ -56,10 +51,10 @@ def sampled(
         ),
     ],
 )
-def test_the_stored_ellipsoids_are_reproduced(case: str, points: str, stored: str) -> None:
-    references = json.loads((DATA / "plan_graph" / "ls_fit_reference.json").read_text())
+def test_the_stored_ellipsoids_are_reproduced(data_folder: Path, case: str, points: str, stored: str) -> None:
+    references = json.loads((data_folder / "plan_graph" / "ls_fit_reference.json").read_text())
     reference = next(r for r in references if r["case"].startswith(case.split("_")[0]))
-    places = np.loadtxt(DATA / "plan_graph" / points, delimiter=",", skiprows=1)[:, -2:]
+    places = np.loadtxt(data_folder / "plan_graph" / points, delimiter=",", skiprows=1)[:, -2:]
     rng = np.random.default_rng(0)
     fits = []
     for _ in range(3):
@@ -69,13 +64,13 @@ def test_the_stored_ellipsoids_are_reproduced(case: str, points: str, stored: st
     # The mean of three against the mean of many draws: two and a half standard errors.
     assert np.all(np.abs(np.mean(fits, axis=0) - reference["A_mean"]) <= 2.5 * spread)
     # The toolbox's own matrix is one draw, with its own random numbers.
-    kept = np.array(json.loads((DATA / "plan_graph" / stored).read_text())["object"]["ls_fit_full"])
+    kept = np.array(json.loads((data_folder / "plan_graph" / stored).read_text())["object"]["ls_fit_full"])
     np.testing.assert_allclose(np.diag(np.mean(fits, axis=0)), np.diag(kept), rtol=0.04)
 
 
-def recorded() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def recorded(data_folder: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     out = {}
-    for path in sorted((DATA / "icra_sensor").glob("pushes_*_*.csv")):
+    for path in sorted((data_folder / "icra_sensor").glob("pushes_*_*.csv")):
         with path.open() as file:
             rows = list(csv.DictReader(file))
         W = np.array([[float(r[k]) for k in ("Fx", "Fy", "tau")] for r in rows])
@@ -84,11 +79,10 @@ def recorded() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return out
 
 
-@needs_data
-def test_recorded_pushes_prefer_the_quartic() -> None:
+def test_recorded_pushes_prefer_the_quartic(data_folder: Path) -> None:
     """Five folds of 50 pushes in each of seven experiments, mean angle of the twists left out [deg]."""
     angles: dict[str, list[np.ndarray]] = {"ellipsoid": [], "quartic": []}
-    for W, V in recorded().values():
+    for W, V in recorded(data_folder).values():
         folds = np.random.default_rng(0).permutation(len(W)) % 5
         for name, fit in (("ellipsoid", fit_ellipsoid), ("quartic", fit_quartic)):
             of_this = np.concatenate(
@@ -109,7 +103,7 @@ def test_recorded_pushes_prefer_the_quartic() -> None:
 
 
 def test_cvxpy_finds_no_better_fit() -> None:
-    cp = pytest.importorskip("cvxpy")
+    cp = pytest.importorskip("cvxpy", reason=extra("test"))
     rng = np.random.default_rng(4)
     support = Support.points(rng.uniform(-1, 1, (4, 2)), rng.uniform(0.2, 1, 4)).centred()
     V = rng.normal(size=(25, 3))

@@ -1,8 +1,6 @@
 """[Zhou2017] Section 3: Proposition 1, Theorem 1, Eqs. 16-33, as printed where right, else corrected."""
 
 import json
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +10,6 @@ from flatpush.errors import InputError, NoDubinsReduction
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import compose, cross, exp, perpendicular, rotate
 from flatpush.steering import flat_output
-
-DATA = (
-    Path(os.environ.get("FLATPUSH_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "plan_graph"
-)
 
 a, b, r, mu = 1.3, 2400.0, 0.021, 0.45
 rho = a / b
@@ -389,10 +383,9 @@ def test_other_refusals():
         flat_output(paper_contact(), PAPER, along=np.nan)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"recorded plan graphs not found at {DATA} (FLATPUSH_DATA)")
-def test_stored_rear_axles_and_radii():
+def test_stored_rear_axles_and_radii(data_folder):
     """The authors' stored rear axle (push frame) and turning radius, for every push of every plan graph."""
-    files = sorted(DATA.glob("plan_graph_*.json"))
+    files = sorted((data_folder / "plan_graph").glob("plan_graph_*.json"))
     assert files
     for file in files:
         for push in json.loads(file.read_text())["push_actions"]:

@@ -118,7 +118,7 @@ def test_the_law_makes_the_flat_point_accelerate_as_asked_for_any_contact():
     np.testing.assert_allclose(motion.twist, model.twist(out, omega), atol=1e-9)
 
 
-@pytest.mark.parametrize("rate", [10, 60, 1000])
+@pytest.mark.parametrize("rate", [10, 60, pytest.param(1000, marks=pytest.mark.slow)])
 def test_the_nominal_push_ends_on_the_reference(rate):
     """The paper's start error, kp = kd = 4: within 0.01 mm and 0.01° after 30 s (6 s at 1 kHz), at any rate."""
     plant, model = square_push()

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.documents import parse_scene
 from flatpush.errors import InputError
 
-pytest.importorskip("gymnasium", reason="gymnasium is in the extra `demonstrations`")
-parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is in the extra `demonstrations`")
+pytest.importorskip("gymnasium", reason=extra("demonstrations"))
+parquet = pytest.importorskip("pyarrow.parquet", reason=extra("demonstrations"))
 
 from flatpush.gym import Eyes, PushTask, demonstrations, lerobot  # noqa: E402  # after what they need
 from flatpush.gym.demonstrations import Block, Episode  # noqa: E402

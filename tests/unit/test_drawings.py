@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from tests.extras import extra
 
 from flatpush.documents import load_scene
 from flatpush.errors import InputError
@@ -20,7 +21,7 @@ FLATNESS = 1e-4
 
 def scene(folder: Path, case: dict[str, Any]) -> Path:
     if case["file"].endswith(".dxf"):
-        pytest.importorskip("ezdxf")
+        pytest.importorskip("ezdxf", reason=extra("shapes"))
     outline = {"file": str(FOLDER / case["file"]), **case.get("choice", {})}
     path = folder / "scene.yaml"
     document = {
@@ -86,7 +87,7 @@ def test_newcomers_need_six_lines(name: str, area: float, sides: tuple[float, fl
     """
     path = Path(__file__).parents[2] / "examples" / f"{name}.yaml"
     if name == "workshop":
-        pytest.importorskip("ezdxf")
+        pytest.importorskip("ezdxf", reason=extra("shapes"))
     said = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     assert len(said) <= 6
     outline = load_scene(path).object.outline

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.broken_off import interrupts
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.control import Camera, PlanController, SimulatedSensor
@@ -310,8 +311,8 @@ def test_an_interrupt_stops_in_every_phase(short_plan, tmp_path, address):
 
 
 def test_bags_hold_standard_messages(tmp_path):
-    reader = pytest.importorskip("mcap.reader")
-    typesys = pytest.importorskip("rosbags.typesys")
+    reader = pytest.importorskip("mcap.reader", reason=extra("export"))
+    typesys = pytest.importorskip("rosbags.typesys", reason=extra("export"))
     path = tmp_path / "log.mcap"
     left = []
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, open_robot, run
@@ -25,7 +26,7 @@ def short_plan(triangle):
 @pytest.mark.parametrize("base", [(0.36, 0.0, 0.2, 0.0), (0.2, -0.3, 0.2, 1.1)])
 def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, name, base):
     if name == "fr3":
-        pytest.importorskip("franky_sim")
+        pytest.importorskip("franky_sim", reason=extra("franka"))
     mujoco, scene = load(), short_plan.scene
     # In the model the middle of the object is at 0, for the arm the table.
     arm = ARMS[name].placed(base, height=height_of(scene) / 2 + FOOT)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from tests.broken_off import interrupts
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.execution import DONE, open_robot, run
@@ -112,7 +113,7 @@ def test_what_the_plan_does_not_know_is_in_the_cell(short_plan):
 def test_pictures_need_no_display(short_plan, tmp_path):
     from PIL import Image
 
-    pytest.importorskip("mujoco")
+    pytest.importorskip("mujoco", reason=extra("sim"))
     if find_library("EGL") is None:
         pytest.skip("there is no libEGL to draw with: install libegl1")
     path = tmp_path / "cell.png"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.broken_off import PHASES, ends, interrupts
+from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
 from tests.waiting import python, started
@@ -17,7 +18,7 @@ from tests.waiting import python, started
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
 
-pytest.importorskip("abb_robot_client")
+pytest.importorskip("abb_robot_client", reason=extra("abb"))
 from flatpush.execution.egm import EgmRobot
 
 SCRIPT = Path(__file__).parents[1] / "egm_controller.py"

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
 from tests.waiting import until
@@ -18,8 +19,8 @@ from flatpush.execution.arms import ARMS
 from flatpush.execution.cell.robot import CellRobot
 from flatpush.execution.simulated import home_of
 
-pytest.importorskip("franky")
-pytest.importorskip("franky_sim")
+pytest.importorskip("franky", reason=extra("franka"))
+pytest.importorskip("franky_sim", reason=extra("franka"))
 from flatpush.execution.franka import FrankaRobot
 
 HOME = np.array([-0.05, 0.02, 0.03, 0.5])
@@ -112,7 +113,7 @@ def test_it_conforms():
 @pytest.mark.slow
 def test_the_same_plan_ends_at_the_same_place_on_all_robots(triangle, tmp_path):
     """On the network the FR3 has no object: the way that its tool really made pushes the one of the physics cell."""
-    pytest.importorskip("abb_robot_client")
+    pytest.importorskip("abb_robot_client", reason=extra("abb"))
     from tests.unit.test_execution_egm import Controller as EgmController
 
     pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.broken_off import PHASES, ends, interrupts
+from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
 from tests.waiting import started
@@ -19,7 +20,7 @@ from tests.waiting import started
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
 
-pytest.importorskip("rtde_control")
+pytest.importorskip("rtde_control", reason=extra("ur"))
 from flatpush.execution.ur import UrRobot
 
 HOME = (-0.1, 0.02, 0.03, 0.5)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shapely import Point
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.errors import InputError
@@ -12,7 +13,7 @@ from flatpush.geometry import Outline, transform
 from flatpush.gym import Eyes, PushPolicy, PushTask, register
 from flatpush.simulation.plant import Plant
 
-gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is in the extra `gym`")
+gymnasium = pytest.importorskip("gymnasium", reason=extra("gym"))
 
 BRICK = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
 

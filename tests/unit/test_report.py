@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 from flatpush.cli import main
 from flatpush.contact import PointContact
@@ -109,7 +110,7 @@ def test_what_all_refuses(words, told, tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 def test_a_cluster_finds_what_this_process_does_and_tells_when():
     """The answers stand in the order of the jobs, whichever comes first."""
-    pytest.importorskip("distributed", reason="a cluster needs the extra `cluster`")
+    pytest.importorskip("distributed", reason=extra("cluster"))
     from flatpush.cli.cluster import cluster
 
     jobs, told = [Job("fig3", quick=True), Job("duality", quick=True)], []

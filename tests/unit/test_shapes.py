@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from tests.extras import extra
 
 from flatpush.documents import load_scene
 from flatpush.documents.contours import outer_contour
@@ -156,7 +157,7 @@ def test_a_missing_extra_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.
 
 
 def dxf(folder: Path, units: int, *draw: tuple[str, tuple[object, ...], dict[str, object]]) -> Path:
-    ezdxf = pytest.importorskip("ezdxf")
+    ezdxf = pytest.importorskip("ezdxf", reason=extra("shapes"))
     drawing = ezdxf.new(units=units)
     space = drawing.modelspace()
     for method, arguments, options in draw:
@@ -209,7 +210,7 @@ def test_dxf_curves(
 
 
 def test_dxf_splines_and_blocks(tmp_path: Path) -> None:
-    ezdxf = pytest.importorskip("ezdxf")
+    ezdxf = pytest.importorskip("ezdxf", reason=extra("shapes"))
     drawing = ezdxf.new(units=4)
     block = drawing.blocks.new("part")
     block.add_spline([(0, 0), (20, -5), (40, 0), (20, 25), (0, 0)])

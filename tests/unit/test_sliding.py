@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.errors import InputError
@@ -200,7 +201,7 @@ def test_the_policy_refuses_other_observations_and_environments(policy):
 
 @pytest.mark.slow
 def test_push_t_is_solved_in_its_own_environment():
-    pytest.importorskip("gym_pusht", reason="gym-pusht is not installed: pip install 'flatpush[gym]'")
+    pytest.importorskip("gym_pusht", reason=extra("gym"))
     from flatpush.experiments.push_t import run
 
     assert "solved 10 of 10" in run(seeds=(100000, 100010))

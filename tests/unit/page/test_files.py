@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from tests.extras import extra
 from tests.live_pages import EXAMPLES, SCENE, dropped
 
 from flatpush.cli.view import _shown as shown_first
@@ -71,7 +72,7 @@ def test_a_drop_that_is_no_file_is_refused(value):
 @pytest.mark.parametrize("ending", [".csv", ".mcap"])
 def test_a_log_of_a_run_is_played_as_it_was(short, tmp_path, ending):
     if ending == ".mcap":
-        pytest.importorskip("mcap", reason="bags are in the extra `export`")
+        pytest.importorskip("mcap", reason=extra("export"))
     plan, document = short
     path = tmp_path / f"run{ending}"
     poses = np.linspace([-0.04, 0.005, 3.1], [0, 0, 3.3], 11)  # the angle goes on beyond π
