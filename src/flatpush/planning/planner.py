@@ -185,22 +185,38 @@ class Planner:
         return slide_planner(self.scene)
 
     def _slides(self, scene: Scene, began: float, below: float) -> Iterator[Answer]:
-        """The cheapest plan of pushes that slide, if it costs less than this."""
-        from .sliding import slide_plans, slide_segments
+        """The cheapest plan of pushes that slide, and of a slide and a car, if they cost less than this."""
+        from .sliding import mixed_segments, slide_plans, slide_segments
 
         plans = []
         for found in slide_plans(self.sliding, scene):
             plans.append(found)
             if clock() - began > scene.planning.time_limit:
                 break
-        for found in reversed(plans):
-            plan = _solved(scene, slide_segments(scene, found.pushes), began, {})
-            assert plan.certificate is not None
-            clear = plan.certificate.clearance  # the way of the hand between the pushes included
-            if clear is None or clear >= scene.planning.clearance:
+        slid = (slide_segments(scene, found.pushes) for found in reversed(plans))
+        for segments in slid:
+            plan = self._clear(scene, segments, began)
+            if plan is not None:
                 if plan.cost < below:
+                    below = plan.cost
                     yield Answer(plan.cost, partial(_again, plan))
-                return
+                break
+        pusher = scene.pusher
+        if self.usable and not scene.free_angle and pusher.transit == "lift" and pusher.turns:
+            for segments in mixed_segments(
+                scene, self.sliding, self.usable, self.fleet, self.transits, below
+            ):
+                plan = self._clear(scene, segments, began)
+                if plan is not None and plan.cost < below:
+                    yield Answer(plan.cost, partial(_again, plan))
+                    return
+
+    def _clear(self, scene: Scene, segments: Segments, began: float) -> Plan | None:
+        """The plan of segments, if it keeps its clearance, the way of the hand between the pushes included."""
+        plan = _solved(scene, segments, began, {})
+        assert plan.certificate is not None
+        clear = plan.certificate.clearance
+        return plan if clear is None or clear >= scene.planning.clearance else None
 
     @property
     def explored(self) -> Array | None:

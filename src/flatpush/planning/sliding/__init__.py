@@ -6,6 +6,7 @@ and a sequence of pushes is a product of displacements.
 """
 
 from .exact import SlidePlan, SlidePlanner, SlidePush
+from .mixed import mixed_segments
 from .sequences import Sequence, SlideSearch
 from .slides import SlideLibrary, slide_library
 from .timed import slide_planner, slide_plans, slide_segments
@@ -17,6 +18,7 @@ __all__ = [
     "SlidePlanner",
     "SlidePush",
     "SlideSearch",
+    "mixed_segments",
     "slide_library",
     "slide_planner",
     "slide_plans",

@@ -19,7 +19,7 @@ from ...steering.time_law import Trapezoid
 from ..segments import SAG, SAG_ANGLE
 from ..transits import LEAST_GAP, Network
 from .sequences import SlideSearch
-from .slides import BEFORE, LENGTHS, STEEPEST, finger_way, slide_library
+from .slides import BEFORE, LENGTHS, STEEPEST, finger_ways, slide_library
 
 NEAR = 0.08  # sequences that miss the goal by less are adjusted, by the reach
 EXACT = 1e-5  # a plan misses the goal by less, measured at the outline's farthest point [m]
@@ -179,16 +179,19 @@ class SlidePlanner:
                     yield plan
                 if tried >= 2 * tries or (least < np.inf and (tried >= tries or effort >= EFFORT * tries)):
                     return
-            nearer = next((s for s in self.search.approaches(left) if self._made(X_WO, s.pushes)), None)
+            nearer = next(
+                (s for s in self.search.approaches(left) if self.world is None or self.made(X_WO, s.pushes)),
+                None,
+            )
             if least < np.inf or nearer is None:
                 return
             way += nearer.pushes
             for k in nearer.pushes:
                 X_WO = compose(X_WO, slides.displacement[k])
 
-    def _made(self, X_WO: Array, numbers: tuple[int, ...]) -> bool:
-        """Whether pushes of the library can be made one after another from a pose."""
-        return self.world is None or self._rolled_out(X_WO, self._parameters(list(numbers))) is not None
+    def made(self, X_WO: Array, numbers: tuple[int, ...]) -> list[SlidePush] | None:
+        """Pushes of the library, by their numbers, made one after another from a pose (3,); None if they cannot be."""
+        return self._rolled_out(X_WO, self._parameters(list(numbers)))
 
     def _parameters(self, numbers: list[int]) -> Array:
         """Edge, place on it, direction and length of pushes of the library, shape (n, 4)."""
@@ -254,14 +257,10 @@ class SlidePlanner:
 
     def _ways(self, pushes: Array) -> Array | None:
         """The fingertip's centre before and after each push in O, (n, 2, 2); None if one cannot begin."""
-        ways = []
-        for edge, along, angle, length in pushes:
-            found = finger_way(self.outline, self.plant.tip_radius, self._room, (int(edge), along, angle))
-            if found is None:
-                return None
-            begin, touch, heading = found
-            ways.append((begin, touch + length * heading))
-        return np.array(ways)
+        begin, touch, heading, good = finger_ways(
+            self.outline, self.plant.tip_radius, self._room, pushes[:, :3]
+        )
+        return np.stack([begin, touch + pushes[:, 3:] * heading], axis=1) if good.all() else None
 
     def _moves(self, pushes: Array) -> Array | None:
         """Displacements by pushes, each rolled out from the origin, shape (n, 3)."""

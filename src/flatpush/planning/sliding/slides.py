@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
@@ -96,18 +97,11 @@ def slide_library(
     angles = np.linspace(-STEEPEST, STEEPEST, DIRECTIONS) if directions is None else np.asarray(directions)
     ways = LENGTHS * outline.size if lengths is None else np.asarray(lengths, dtype=float)
     room = BEFORE * outline.size if before is None else before
-    rows, touching, headings, starts = [], [], [], []
-    for edge, along in places:
-        for angle in angles:
-            way = finger_way(outline, tip, room, (int(edge), float(along), angle))
-            if way is not None:
-                rows.append((edge, along, angle))
-                starts.append(way[0])
-                touching.append(way[1])
-                headings.append(way[2])
-    if not rows:
+    rows = np.array([(edge, along, angle) for edge, along in places for angle in angles]).reshape(-1, 3)
+    begin, touch, heading, good = finger_ways(outline, tip, room, rows)
+    if not good.any():
         raise InputError("no finger of this radius reaches the outline", value=tip)
-    touch, heading, begin = np.array(touching), np.array(headings), np.array(starts)
+    rows, begin, touch, heading = rows[good], begin[good], touch[good], heading[good]
     end = touch[:, None] + ways[:, None] * heading[:, None]  # (n, lengths, 2)
     hand = np.zeros((len(rows), 2 + len(ways), 3))
     hand[..., :2] = np.concatenate([begin[:, None], touch[:, None], end], axis=1)
@@ -122,7 +116,7 @@ def slide_library(
     good = (runs.outcome == 0) & (others.outcome == 0)
     moved = runs.object[good][:, 2:].reshape(-1, 3)
     elsewhere = others.object[good][:, 2:].reshape(-1, 3)
-    number = np.array(rows)[good].repeat(len(ways), axis=0)
+    number = rows[good].repeat(len(ways), axis=0)
     library = SlideLibrary(
         number[:, 0].astype(np.intp),
         number[:, 1],
@@ -139,23 +133,36 @@ def slide_library(
     return replace(library, growth=off / (ASIDE * outline.size))
 
 
-def finger_way(
-    outline: Outline, tip: float, room: float, push: tuple[int, float, float]
-) -> tuple[Array, Array, Array] | None:
-    """Where the fingertip's centre is before a push and at contact, and the push's direction, each (2,) in O.
+def finger_ways(
+    outline: Outline, tip: float, room: float, pushes: Array
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Where the fingertip's centre is before pushes and at contact, and their directions, each (n, 2) in O.
 
-    None if the finger would start in the object, or so near that it touched elsewhere.
+    Also whether each can begin, shape (n,): its finger does not start in the object, nor so near that it touched
+    elsewhere.
 
     Args:
         tip: its radius [m]. room: as slide_library's `before`.
-        push: edge, place on it, and angle from the inward normal [rad].
+        pushes: edge, place on it, and angle from the inward normal [rad], shape (n, 3).
     """
-    edge, along, angle = push
-    contact = outline.at(edge, along)
-    centre = contact.point - tip * contact.normal
-    heading = rotate(angle, contact.normal)
-    start = centre - room / np.cos(angle) * heading
-    return (start, centre, heading) if outline.nearest(start).distance >= tip + 0.5 * room else None
+    edge, along, angle = pushes.T
+    if outline.is_circle:
+        normal = -np.column_stack([np.cos(2 * np.pi * along), np.sin(2 * np.pi * along)])
+        contact = outline.centre - outline.radius * normal
+    else:
+        ends = outline.edges[edge.astype(int)]
+        normal = outline.edge_normals[edge.astype(int)]
+        contact = ends[:, 0] + along[:, None] * (ends[:, 1] - ends[:, 0])
+    centre, heading = contact - tip * normal, rotate(angle, normal)
+    start = centre - (room / np.cos(angle))[:, None] * heading
+    return start, centre, heading, _outside(outline, start) >= tip + 0.5 * room
+
+
+def _outside(outline: Outline, points: Array) -> Array:
+    """Distances of points (n, 2) from an outline, 0 or less inside, shape (n,) [m]."""
+    if outline.is_circle:
+        return np.linalg.norm(points - outline.centre, axis=1) - outline.radius
+    return np.asarray(shapely.distance(shapely.Polygon(outline.vertices), shapely.points(points)))
 
 
 def _around(thing: Object) -> Array:

@@ -78,7 +78,7 @@ def slide_segments(
         segments.append(slide)
         pose, before = push.object[-1], slide.pusher[-1]
     assert before is not None
-    away = _risen(scene, _away(scene, pose, before))
+    away = leaving(scene, pose, before)
     last = PusherPath(relative(pose, away[0]), away[1], 0.0).segment(scene.pusher, pose)
     return (*segments, following(last, segments[-1]))
 
@@ -92,10 +92,15 @@ def _way(scene: Scene, pose: Array, before: Array | None, begin: Array, around: 
         turned = before[2] + share * wrap_angle(begin[2] - before[2])
         poses, heights = np.column_stack([around, turned]), np.zeros(len(around))
     else:
-        poses, heights = _risen(scene, _away(scene, pose, before))
+        poses, heights = leaving(scene, pose, before)
         end = np.array([*begin[:2], before[2] + wrap_angle(begin[2] - before[2])])
         poses, heights = np.concatenate([poses, [end, end]]), np.concatenate([heights, heights[-1:], [0.0]])
     return PusherPath(relative(pose, poses), heights, 0.0)
+
+
+def leaving(scene: Scene, pose: Array, hand: Array) -> tuple[Array, Array]:
+    """Poses X_WE (n, 3) and heights (n,) of a hand after a slide that left the object at X_WO, both (3,)."""
+    return _risen(scene, _away(scene, pose, hand))
 
 
 def _risen(scene: Scene, poses: Array) -> tuple[Array, Array]:
