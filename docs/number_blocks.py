@@ -33,10 +33,19 @@ def rows(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def challenge() -> str:
+    """The tables of what the challenge keeps of entries."""
+    command = [sys.executable, str(DOCS.parent / "benchmarks" / "challenge" / "run.py"), "--results"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
 BLOCKS: dict[str, tuple[str, Callable[[], str]]] = {
     "stored-graphs": ("flatpush experiment stored-graphs --data DIR", lambda: rows("stored-graphs")),
     "open-loop": ("flatpush experiment open-loop", lambda: rows("open-loop")),
     "fig4": ("flatpush experiment fig4", lambda: rows("fig4")),
+    "challenge": ("python benchmarks/challenge/run.py --results", challenge),
     "duality": ("flatpush experiment duality", lambda: rows("duality")),
 }
 RECORDED = {"stored-graphs"}

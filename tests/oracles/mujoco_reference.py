@@ -18,6 +18,7 @@ HEIGHT, GRAVITY, HEAVY = 0.02, 300.0, 1e6
 FOOT, LIGHT = 0.1, 0.002  # mass of a foot of mean load, and of everything else [kg]
 FOOT_RATE, SIDE_RATE = 1e4, 200.0  # b at a foot, μ b at a finger [1/s]
 FLOOR = 0.02
+ON_AN_ARC = 201  # poses
 
 
 def _body(thing: fp.Object, boxes: Sequence[tuple[float, float, float, float]]) -> tuple[str, str]:
@@ -45,9 +46,12 @@ def _body(thing: fp.Object, boxes: Sequence[tuple[float, float, float, float]]) 
 
 
 def _pair(first: str, second: str, friction: float, rate: float) -> str:
+    solid = 'solref="0.003 1" solimp="0.9999 0.9999 0.001"'
+    if not friction:
+        return f'<pair geom1="{first}" geom2="{second}" condim="1" {solid}/>'
     return (
         f'<pair geom1="{first}" geom2="{second}" condim="3" friction="{friction} {friction} 0 0 0"'
-        f' solref="0.003 1" solimp="0.9999 0.9999 0.001" solreffriction="0 {-rate}"/>'
+        f' {solid} solreffriction="0 {-rate}"/>'
     )
 
 
@@ -55,8 +59,8 @@ def _model(
     thing: fp.Object,
     tips: np.ndarray,
     radius: float,
-    centre_or_angle: np.ndarray | float,
     boxes: Sequence[tuple[float, float, float, float]],
+    step: float,
 ) -> mujoco.MjModel:
     assets, geoms = _body(thing, boxes)
     places, weights = thing.support.feet
@@ -71,21 +75,16 @@ def _model(
         ' conaffinity="0"/>'
         for i, (x, y) in enumerate(tips)
     )
-    joint = (
-        f'<joint type="slide" axis="{np.cos(centre_or_angle)} {np.sin(centre_or_angle)} 0"/>'
-        if np.ndim(centre_or_angle) == 0
-        else f'<joint type="hinge" pos="{centre_or_angle[0]} {centre_or_angle[1]} 0"/>'
-    )
     floor = "".join(_pair("floor", f"foot{k}", FLOOR, FOOT_RATE) for k in range(len(loads)))
     sides = "".join(
-        _pair(f"side{k}", f"tip{i}", thing.friction, SIDE_RATE / thing.friction)
+        _pair(f"side{k}", f"tip{i}", thing.friction, SIDE_RATE / max(thing.friction, 1e-9))
         for k in range(max(len(boxes), 1))
         for i in range(len(tips))
     )
     model = mujoco.MjModel.from_xml_string(f"""
 <mujoco>
   <compiler inertiafromgeom="auto" boundmass="1e-9" boundinertia="1e-12"/>
-  <option timestep="{STEP}" cone="elliptic" solver="Newton" tolerance="1e-12" iterations="100" impratio="1"
+  <option timestep="{step}" cone="elliptic" solver="Newton" tolerance="1e-12" iterations="100" impratio="1"
     gravity="0 0 -{GRAVITY}" integrator="Euler"/>
   <asset>{assets}</asset>
   <worldbody>
@@ -94,12 +93,63 @@ def _model(
       <joint type="hinge" axis="0 0 1"/>
       <inertial pos="0 0 0" mass="{LIGHT}" diaginertia="1e-6 1e-6 1e-6"/>
       {geoms}{feet}</body>
-    <body name="hand">{joint}{fingers}</body>
+    <body name="hand"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+      <joint type="hinge" axis="0 0 1" armature="{HEAVY}"/>{fingers}</body>
   </worldbody>
   <contact>{floor}{sides}</contact>
 </mujoco>""")
     model.stat.meaninertia = FOOT  # what the solver's tolerance is relative to: not the hand
     return model
+
+
+class Reference:
+    """The object, and fingers that a hand moves as it is told.
+
+    Args:
+        thing: on feet. tips: fingertip centres in the frame of the hand, shape (k, 2). radius: theirs [m].
+        boxes: of which the object consists, if it is not convex.
+        speed: of the fastest fingertip [m/s]. step: of time [s].
+    """
+
+    def __init__(
+        self,
+        thing: fp.Object,
+        tips: np.ndarray,
+        radius: float,
+        boxes: Sequence[tuple[float, float, float, float]] = (),
+        speed: float = SPEED,
+        step: float = STEP,
+    ) -> None:
+        self.tips, self.speed, self.step = np.asarray(tips, dtype=float), speed, step
+        self._model = _model(thing, self.tips, radius, boxes, step)
+        self._data = mujoco.MjData(self._model)
+
+    def follow(self, pose: np.ndarray, hands: np.ndarray) -> np.ndarray:
+        """Poses X_WO of the object (n, 3), which was at rest, as its hand is at poses X_WE (n, 3), straight between."""
+        model, data = self._model, self._data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:3], data.qpos[-3:] = pose, hands[0]
+        inertia = np.zeros((model.nv, model.nv))
+        found, pace, spare = [np.array(pose)], 0.0, 0.0
+        for move in np.diff(hands, axis=0):
+            left = float(np.max(np.hypot(*move[:2]) + abs(move[2]) * np.hypot(*self.tips.T)))
+            direction = move / max(left, 1e-12)
+            while left > 1e-12:
+                # The hand sets out gently, so that the object's inertia shows nowhere.
+                gains = START if pace < self.speed else 0.0
+                part = min(left, (self.speed**2 - pace**2) / (2 * START)) if gains else left
+                lasts = (np.sqrt(pace**2 + 2 * START * part) - pace) / START if gains else part / pace
+                mujoco.mj_forward(model, data)
+                mujoco.mj_fullM(model, data, inertia)
+                data.qvel[-3:] = pace * direction
+                data.qfrc_applied[-3:] = inertia[-3:, -3:] @ (gains * direction)
+                steps, spare = divmod(spare + lasts / self.step, 1.0)
+                mujoco.mj_step(model, data, nstep=int(steps))
+                left, pace = left - part, min(pace + gains * lasts, self.speed)
+                if self.speed - pace < 1e-9:
+                    pace = self.speed
+            found.append(np.array(data.qpos[:3]))
+        return np.array(found)
 
 
 def push(
@@ -121,20 +171,11 @@ def push(
         boxes: of which the object consists, if it is not convex.
     """
     if angle is not None:
-        model, rate = _model(thing, tips, radius, angle, boxes), SPEED
+        hands = np.array([[0.0, 0.0, 0.0], [length * np.cos(angle), length * np.sin(angle), 0.0]])
     else:
         assert centre is not None
-        model, rate = _model(thing, tips, radius, centre, boxes), SPEED / float(np.hypot(*(tips[0] - centre)))
-    data = mujoco.MjData(model)
-    data.qpos[:3] = start
-    # The hand sets out gently, so that the object's inertia shows nowhere.
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, inertia)
-    begin = SPEED / START  # [s], in which it goes half as far as later
-    data.qfrc_applied[-1] = np.sign(length) * rate / begin * inertia[-1, -1]
-    mujoco.mj_step(model, data, nstep=round(begin / STEP))
-    data.qfrc_applied[-1] = 0.0
-    data.qvel[-1] = np.sign(length) * rate
-    mujoco.mj_step(model, data, nstep=round((abs(length) / SPEED - 0.5 * begin) / STEP))
-    return np.array(data.qpos[:3])
+        turns = np.linspace(0.0, length / float(np.hypot(*(tips[0] - centre))), ON_AN_ARC)
+        c, s = np.cos(turns), np.sin(turns)
+        x, y = centre
+        hands = np.column_stack([x - c * x + s * y, y - s * x - c * y, turns])
+    return Reference(thing, tips, radius, boxes).follow(start, hands)[-1]

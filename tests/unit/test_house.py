@@ -52,7 +52,7 @@ def python_blocks() -> list[tuple[str, str]]:
     ("name", "block"), python_blocks(), ids=lambda value: value if "\n" not in value else ""
 )
 def test_the_python_in_the_documents_runs(name, block, tmp_path, monkeypatch, capsys):
-    for folder in ("examples", "docs"):
+    for folder in ("examples", "docs", "benchmarks"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, name, "exec"), {"__name__": name})
