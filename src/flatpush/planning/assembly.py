@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..geometry import relative
-from ..problem import PushSegment, Scene, Segment, SlideSegment, TransitSegment
+from ..problem import Scene, Segment
 from ..steering.car import Car
 from .options import PushOption
 from .path import Path
@@ -15,7 +15,7 @@ from .rolling import rolling_segment
 from .segments import arcs_of, fingertips, push_segment
 from .transits import Transits
 
-Moved = TypeVar("Moved", PushSegment, SlideSegment, TransitSegment)
+Moved = TypeVar("Moved", bound=Segment)
 Segments = tuple[Segment, ...]
 
 
