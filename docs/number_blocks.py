@@ -3,6 +3,9 @@
 A block stands in a page between `<!-- numbers: NAME … -->` and `<!-- /numbers -->`. Without --check it is written anew,
 with the commit; with it a block whose words differ, or whose numbers differ by more than 2 % or a unit of their last
 digit, ends with status 1. Blocks that read recorded data are left alone where FLATPUSH_DATA names none.
+
+Tables whose command is dear stand as they were measured, below `<!-- measured: `COMMAND`, stood here at COMMIT -->`:
+whoever measures them anew writes the commit, too.
 """
 
 import os
@@ -46,9 +49,24 @@ BLOCKS: dict[str, tuple[str, Callable[[], str]]] = {
     "open-loop": ("flatpush experiment open-loop", lambda: rows("open-loop")),
     "fig4": ("flatpush experiment fig4", lambda: rows("fig4")),
     "challenge": ("python benchmarks/challenge/run.py --results", challenge),
+    "fig3": ("flatpush experiment fig3", lambda: rows("fig3")),
     "duality": ("flatpush experiment duality", lambda: rows("duality")),
 }
 RECORDED = {"stored-graphs"}
+MEASURED = re.compile(r"<!-- measured: `([^`]+)`, stood here at ([0-9a-f]{7}) -->\n\Z")
+TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
+
+
+def untold(text: str) -> list[str]:
+    """First rows of the tables of a page that mostly hold numbers and do not say which command prints them."""
+    found = []
+    for table in TABLE.finditer(BLOCK.sub("", text)):
+        rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table[0].splitlines()]
+        cells = [cell for row in rows[2:] for cell in row[1:] if cell]
+        numbers = sum(bool(re.match(r"[*−~-]*\d", cell)) for cell in cells)
+        if 2 * numbers > len(cells) and not MEASURED.search(table.string[: table.start()]):
+            found.append(" | ".join(rows[0]))
+    return found
 
 
 def same(one: str, other: str) -> bool:

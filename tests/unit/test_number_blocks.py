@@ -1,10 +1,13 @@
 """Numbers in the documents that a command writes: compared as numbers, and the quick ones stand as printed."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
 from tests.waiting import python
+
+from flatpush.experiments import EXPERIMENTS
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "docs" / "number_blocks.py"
@@ -40,10 +43,36 @@ def test_every_block_has_a_command_and_is_filled(blocks):
     for page in sorted((ROOT / "docs").glob("*.md")):
         for name, told, inside in blocks.BLOCK.findall(page.read_text("utf-8")):
             found[name] = told, inside
-    assert set(found) <= set(blocks.BLOCKS)
+    assert set(found) == set(blocks.BLOCKS)
     for name, (told, inside) in found.items():
         assert blocks.BLOCKS[name][0] in told
         assert inside.count("|") > 8
+
+
+@pytest.mark.parametrize(
+    ("above", "told"),
+    [
+        ("", False),
+        ("<!-- measured: `flatpush experiment cone`, stood here at 5e4d1f9 -->\n", True),
+        ("<!-- measured: `flatpush experiment cone`, stood here at 5e4d1f9 -->\nWords.\n\n", False),
+        ("<!-- measured: `flatpush experiment cone` -->\n", False),
+    ],
+)
+def test_a_table_of_numbers_says_which_command_prints_it(blocks, above, told):
+    table = "| | here |\n|---|---|\n| error | 0.13 mm |\n"
+    assert blocks.untold(above + table) == ([] if told else [" | here"])
+    assert blocks.untold("| key | meaning |\n|---|---|\n| circle | a radius |\n") == []
+
+
+def test_every_table_of_numbers_in_the_documents_says_it(blocks):
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        text = page.read_text("utf-8")
+        assert blocks.untold(text) == [], page.name
+        for command in re.findall(r"<!-- measured: `([^`]+)`", text):
+            named = re.findall(r"benchmarks/\w+\.py", command)
+            assert all((ROOT / file).exists() for file in named)
+            experiments = set(command.removeprefix("flatpush experiment ").split(" --")[0].split())
+            assert named or experiments <= set(EXPERIMENTS), command
 
 
 @pytest.mark.slow
