@@ -127,6 +127,16 @@ def test_the_exact_twist_of_a_wrench_is_its_own(
 
 
 @examples
+@given(st.data(), supports())
+def test_the_twists_of_many_wrenches_are_those_of_each(data: st.DataObject, support: Support) -> None:
+    surface = Exact(support)
+    W = support.wrench(data.draw(twists(support)))
+    assume(np.all(np.any(W != 0, axis=1)))
+    each = support.wrench(np.array([surface.twist(F) for F in W]))
+    np.testing.assert_allclose(support.wrench(surface.twist(W)), each, atol=SOLVED)
+
+
+@examples
 @given(supports(), directions(2))
 def test_a_force_through_the_centre_of_friction_translates_along_itself(
     support: Support, f: np.ndarray

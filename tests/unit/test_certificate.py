@@ -7,8 +7,8 @@ import pytest
 
 import flatpush as fp
 from flatpush.contact import PointContact, composite_margin, spacing_margin, two_point_sticks
-from flatpush.friction import Ellipsoid
-from flatpush.geometry import exp, shift_twist, velocity_at
+from flatpush.friction import Ellipsoid, Exact, Support
+from flatpush.geometry import exp, rotate, shift_twist, velocity_at
 from flatpush.problem import TransitSegment
 from flatpush.simulation import certify
 from flatpush.simulation.claims import TRUSTED_GROWTH
@@ -179,7 +179,7 @@ def test_the_motion_of_two_fingers_may_turn_by_what_is_said():
     contacts = [PointContact([x, -0.015], [0.0, 1.0], 0.5) for x in (0.009, -0.009)]
     surface, middle = Ellipsoid(np.diag([1.0, 1.0, 5000.0])), np.array([0.0, -0.015])
     twist = np.array([0.01, 0.03, 0.5])
-    found = cone_margins(contacts, surface, middle, twist)
+    found = cone_margins(surface, [contacts], middle[None], twist[None])[0]
     u = velocity_at(twist, middle)
 
     def sticks(degrees, tighter=1.0):
@@ -223,3 +223,49 @@ def test_no_certificate_without_a_push_has_margins():
     certificate = certify(scene, ())
     assert certificate.friction_margin is None
     assert certificate.cost == certificate.duration == 0
+
+
+def test_motions_judged_together_are_where_one_after_the_other_they_leave_the_cone():
+    """Every step on the way out by two_point_sticks alone, halved between the last inside and the first outside."""
+    rng = np.random.default_rng(3)
+    surface = Exact(Support.outline([(-0.02, -0.015), (0.02, -0.015), (0.0, 0.03)]).centred())
+    pairs, twists = [], []
+    for spacing in (0.012, 0.02):
+        contacts = [PointContact([x, -0.015], [0.1, 1.0], 0.5) for x in (0.5 * spacing, -0.5 * spacing)]
+        for share in rng.uniform(0.2, 0.8, 2):
+            F = share * contacts[0].wrench([0.1, 1.0]) + (1 - share) * contacts[1].wrench([-0.05, 1.0])
+            pairs.append(contacts)
+            twists.append(surface.twist(F))
+    twists.append(surface.twist([0.01, -1.0, 0.0]))  # pulls: outside the cone
+    pairs.append(pairs[0])
+    middle = np.array([0.0, -0.015])
+    found = cone_margins(surface, pairs, np.tile(middle, (5, 1)), np.array(twists))
+
+    def leaves(contacts, way, most):
+        def outside(s):
+            return not two_point_sticks(contacts, surface, way(s))
+
+        first = next((k for k in range(1, 65) if outside(most * k / 64)), None)
+        if first is None:
+            return most
+        low, high = most * (first - 1) / 64, most * first / 64
+        for _ in range(45):
+            half = 0.5 * (low + high)
+            low, high = (low, half) if outside(half) else (half, high)
+        return low
+
+    for contacts, V, margins in zip(pairs[:4], twists[:4], found[:4], strict=True):
+
+        def turned(angle, tighter=0.0, V=V):
+            u, w = rotate(angle, velocity_at(V, middle)), V[2] * np.exp(tighter)
+            return np.array([*(u - velocity_at([0.0, 0.0, w], middle)), w])
+
+        sides = [leaves(contacts, lambda s, side=side: turned(side * s), np.pi) for side in (1, -1)]
+        log = leaves(contacts, lambda s: turned(0.0, s), np.log(64))
+        assert np.radians(margins.motion) == pytest.approx(min(sides), abs=2e-8)  # the cone's relative slack
+        assert margins.curvature == pytest.approx(1 - np.exp(-log), abs=2e-8)
+        assert margins.friction == pytest.approx(composite_margin(contacts, surface, V), abs=1e-12)
+        assert margins.spacing == pytest.approx(spacing_margin(contacts, surface, V), abs=1e-12)
+    assert found[4].friction < 0
+    assert found[4].motion == -180
+    assert found[4].curvature == -np.inf

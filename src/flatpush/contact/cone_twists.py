@@ -110,19 +110,29 @@ def _turns(
     rays = rays / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
     nexts = np.roll(rays, -1, axis=0)
     parts = np.arange(between + 1) / (between + 1)
-    found: tuple[list[Array], list[Array]] = ([], [])
-    for F in np.concatenate([(1 - s) * rays + s * nexts for s in parts]):
-        way, step = 0.0, PAST_EDGE
-        while way < 1:
-            V = surface.twist((1 - way) * F + way * towards)
-            if V[2] == 0 or cone.depths(surface.wrench_set(V))[0] >= -CLOSED:
-                break
-            way, step = way + step, 1.5 * step
-        if way < 1 and V[2] != 0:
-            found[0 if V[2] > 0 else 1].append(V / abs(V[2]))
-    if not found[0] or not found[1]:
+    wrenches = np.concatenate([(1 - s) * rays + s * nexts for s in parts])
+    twists = surface.twist(wrenches)
+    if surface.has_facets:
+        twists = np.array(
+            [_off_facet(cone, surface, *each, towards) for each in zip(wrenches, twists, strict=True)]
+        )
+    kept = twists[:, 2] != 0
+    turns = twists[kept] / np.abs(twists[kept, 2:])
+    lefts, rights = turns[turns[:, 2] > 0], turns[turns[:, 2] < 0]
+    if not len(lefts) or not len(rights):
         raise NoDubinsReduction("the two fingers cannot turn the object both ways and keep it")
-    return np.array(found[0]), np.array(found[1])
+    return lefts, rights
+
+
+def _off_facet(cone: WrenchCone, surface: LimitSurface, F: Array, V: Array, towards: Array) -> Array:
+    """The twist V of a wrench F, both (3,), or of one nearer to the straight one that the cone holds; zero if none."""
+    way, step = 0.0, PAST_EDGE
+    while V[2] != 0 and cone.depths(surface.wrench_set(V))[0] < -CLOSED:
+        way, step = way + step, 1.5 * step
+        if way >= 1:
+            return np.zeros(3)
+        V = surface.twist((1 - way) * F + way * towards)
+    return V
 
 
 def _tightest(lefts: Array, rights: Array, hand: Array, cost: Cost) -> tuple[Array, Array]:
@@ -145,8 +155,8 @@ def _between(
     V = V / np.hypot(V[0], V[1])
     if inner.depth(surface.wrench(V)) >= 0:
         return V
-    ends = [surface.twist(F)[:2] for F in pair]
-    ends = [end / np.hypot(*end) for end in ends]
+    ends = surface.twist(np.array(pair))[:, :2]
+    ends = ends / np.linalg.norm(ends, axis=1, keepdims=True)
     v = max(ends, key=lambda end: float(end @ V[:2]))
     return np.array([*v, 0.0])
 

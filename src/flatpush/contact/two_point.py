@@ -5,14 +5,16 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import finite
 from ..friction.surface import LimitSurface, WrenchSet
-from ..geometry import cross, perpendicular
+from ..geometry import cross
 from ..geometry.pose import Array
 from .point_contact import PointContact
-from .wrench_cone import CLOSED, lever_of, shared
+from .wrench_cone import CLOSED, axis_wrenches, edge_wrenches, lever_of, shared
+
+Contacts = Sequence[PointContact]
 
 
 def two_point_sticks(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> bool:
@@ -30,25 +32,33 @@ def composite_margin(contacts: Sequence[PointContact], surface: LimitSurface, tw
 
     1 if the twist sticks without friction, 0 on the cone's boundary, negative if it takes more friction than there
     is; -inf if no friction is enough (or, for a rotation about a support point, ten times the friction).
+    """
+    return composite_margins([contacts], [surface.wrench_set(twist)])[0]
+
+
+def composite_margins(pairs: Sequence[Contacts], twists: Sequence[WrenchSet]) -> list[float]:
+    """composite_margin of pairs of contacts, each with all wrenches of its twist.
 
     The forces of two contacts that make a wrench have one parameter left, a squeeze. With normal parts a and
     tangential parts b they need the friction max |b| / a, the least of which over all squeezes is what counts.
     """
-    wrenches = surface.wrench_set(twist)
-    if wrenches.radius > 0:
-        return _last(
-            lambda margin: _inside(
-                [replace(c, friction=(1 - margin) * c.friction) for c in contacts], wrenches
-            )
-        )
-    rays = [c.wrench(f) for c in contacts for f in (c.normal, perpendicular(c.normal))]
-    parts = _forces(rays, wrenches.centre, lever_of(contacts))
-    if parts is None:
-        return -np.inf
-    a, b = parts[0::2], parts[1::2]
-    needed = -_greatest_least(np.concatenate([b, -b]), np.concatenate([a, a]))
-    mu = contacts[0].friction
-    return 1 - needed / mu if mu > 0 else (1.0 if needed <= CLOSED else -np.inf)
+
+    def by_halving(contacts: Contacts, wrenches: WrenchSet) -> float:
+        def weaker(margin: float) -> list[PointContact]:
+            return [replace(c, friction=(1 - margin) * c.friction) for c in contacts]
+
+        return _last(lambda margin: _inside(weaker(margin), wrenches))
+
+    def by_squeezing(contacts: list[Contacts], parts: Array) -> list[float]:
+        a, b = parts[:, 0::2], parts[:, 1::2]
+        least = -_greatest_least(np.concatenate([b, -b], axis=1), np.concatenate([a, a], axis=1))
+        margins = []
+        for pair, needed in zip(contacts, least.tolist(), strict=True):
+            mu = pair[0].friction
+            margins.append(1 - needed / mu if mu > 0 else (1.0 if needed <= CLOSED else -np.inf))
+        return margins
+
+    return _margins(pairs, twists, by_halving, axis_wrenches, by_squeezing)
 
 
 def spacing_margin(contacts: Sequence[PointContact], surface: LimitSurface, twist: ArrayLike) -> float:
@@ -58,59 +68,112 @@ def spacing_margin(contacts: Sequence[PointContact], surface: LimitSurface, twis
     distance is enough (for a rotation about a support point: ten times the distance). On curved sides, where moving
     would change the normals: twice the part of the load that the lighter one bears at least (see wrench_cone.shared).
     """
-    wrenches = surface.wrench_set(twist)
-    if wrenches.radius > 0:
+    return spacing_margins([contacts], [surface.wrench_set(twist)])[0]
+
+
+def spacing_margins(pairs: Sequence[Contacts], twists: Sequence[WrenchSet]) -> list[float]:
+    """spacing_margin of pairs of contacts, each with all wrenches of its twist."""
+
+    def by_halving(contacts: Contacts, wrenches: WrenchSet) -> float:
         return _last(lambda margin: shared(contacts, 0.5 * margin).depths(wrenches)[1] >= -CLOSED)
-    parts = _forces(
-        [c.wrench(f) for c in contacts for f in c.force_edges()], wrenches.centre, lever_of(contacts)
-    )
-    if parts is None:
-        return -np.inf
-    # Each pair of like edges (both left, both right) is shared: the lesser part over the sum, at its greatest.
-    both = parts[:2] + parts[2:]
-    return min(1.0, 2 * _greatest_least(parts, np.concatenate([both, both])))
+
+    def by_squeezing(contacts: list[Contacts], parts: Array) -> list[float]:
+        # Each pair of like edges (both left, both right) is shared: the lesser part over the sum, at its greatest.
+        both = parts[:, :2] + parts[:, 2:]
+        greatest = _greatest_least(parts, np.concatenate([both, both], axis=1))
+        return [min(1.0, 2 * share) for share in greatest.tolist()]
+
+    return _margins(pairs, twists, by_halving, edge_wrenches, by_squeezing)
 
 
-def _forces(rays: Sequence[Array], wrench: Array, lever: float) -> Array | None:
-    """All coefficients x = x₀ + s z of four wrenches that add up to one, as (x₀, z), shape (4, 2); None if none do."""
-    scale = np.array([1.0, 1.0, 1.0 / lever])
-    G, F = (np.array(rays) * scale).T, wrench * scale
+def _margins(
+    pairs: Sequence[Contacts],
+    twists: Sequence[WrenchSet],
+    by_halving: Callable[[Contacts, WrenchSet], float],
+    rays_of: Callable[[Contacts], Array],
+    by_squeezing: Callable[[list[Contacts], Array], list[float]],
+) -> list[float]:
+    """Margins of pairs of contacts: by halving where a twist has many wrenches, else from the forces that make its one.
+
+    Args:
+        rays_of: the four wrenches of a pair whose multiples are the forces.
+        by_squeezing: margins from what _forces tells of some pairs.
+    """
+    found = [-np.inf] * len(pairs)
+    single = [i for i, wrenches in enumerate(twists) if wrenches.radius == 0]
+    for i in set(range(len(pairs))).difference(single):
+        found[i] = by_halving(pairs[i], twists[i])
+    if single:
+        levers = np.array([lever_of(pairs[i]) for i in single])
+        rays, wrenches = (
+            np.array([rays_of(pairs[i]) for i in single]),
+            np.array([twists[i].centre for i in single]),
+        )
+        parts, made = _forces(rays, wrenches, levers)
+        some = [i for i, is_made in zip(single, made, strict=True) if is_made]
+        for i, margin in zip(
+            some, by_squeezing([pairs[i] for i in some], parts[made]) if some else [], strict=True
+        ):
+            found[i] = margin
+    return found
+
+
+def _forces(rays: Array, wrenches: Array, levers: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """All coefficients x = x₀ + s z of four wrenches (n, 4, 3) that add up to one (n, 3), as (x₀, z).
+
+    Returns:
+        x₀ and z, shape (n, 4, 2), and whether there are such, shape (n,).
+    """
+    scale = np.stack([np.ones_like(levers), np.ones_like(levers), 1 / levers], axis=1)
+    G, F = np.swapaxes(rays * scale[:, None], 1, 2), wrenches * scale
     U, sizes, V = np.linalg.svd(G)
-    if sizes[2] <= CLOSED * sizes[0]:
-        x = np.linalg.pinv(G, rcond=CLOSED) @ F
-        return None if np.linalg.norm(G @ x - F) > CLOSED * np.linalg.norm(F) else np.stack([x, V[3]], axis=1)
-    x = V[:3].T @ ((U.T @ F) / sizes)
-    return np.stack([x, float(np.linalg.norm(x)) * V[3]], axis=1)
+    flat = sizes[:, 2] <= CLOSED * sizes[:, 0]
+    along = np.einsum("nij,ni->nj", U, F) / np.where(flat[:, None], 1.0, sizes)
+    x = np.einsum("nij,ni->nj", V[:, :3], along)
+    z = np.linalg.norm(x, axis=1)[:, None] * V[:, 3]
+    for i in np.flatnonzero(flat):
+        x[i], z[i] = np.linalg.pinv(G[i], rcond=CLOSED) @ F[i], V[i, 3]
+    made = ~flat | (
+        np.linalg.norm(np.einsum("nij,nj->ni", G, x) - F, axis=1) <= CLOSED * np.linalg.norm(F, axis=1)
+    )
+    return np.stack([x, z], axis=2), made
 
 
-def _greatest_least(numerators: Array, denominators: Array) -> float:
+def _greatest_least(numerators: Array, denominators: Array) -> Array:
     """The greatest over s of the least of n(s) / d(s) among linear functions, where all d(s) ≥ 0; -inf if nowhere.
 
     Each ratio is monotone in s, so it is where two are equal, or at infinity. A 0 / 0 demands nothing.
 
     Args:
-        numerators, denominators: values at s = 0 and slopes, shape (k, 2).
+        numerators, denominators: values at s = 0 and slopes, shape (m, k, 2): of k functions in each of m cases.
+
+    Returns:
+        of each case, shape (m,).
     """
     n, d = numerators, denominators
-    i, j = np.triu_indices(len(n), 1)
-    constant = n[i, 0] * d[j, 0] - n[j, 0] * d[i, 0]
-    linear = n[i, 0] * d[j, 1] + n[i, 1] * d[j, 0] - n[j, 0] * d[i, 1] - n[j, 1] * d[i, 0]
-    square = n[i, 1] * d[j, 1] - n[j, 1] * d[i, 1]
+    i, j = np.triu_indices(n.shape[1], 1)
+    (ni, nj), (di, dj) = (
+        (np.moveaxis(n, 2, 0)[:, :, k] for k in (i, j)),
+        (np.moveaxis(d, 2, 0)[:, :, k] for k in (i, j)),
+    )
+    constant = ni[0] * dj[0] - nj[0] * di[0]
+    linear = ni[0] * dj[1] + ni[1] * dj[0] - nj[0] * di[1] - nj[1] * di[0]
+    square = ni[1] * dj[1] - nj[1] * di[1]
     root = np.sqrt(np.maximum(linear**2 - 4 * square * constant, 0.0))
     q = -0.5 * (linear + np.where(linear < 0, -root, root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = np.concatenate([q / square, constant / q])
-    s = np.concatenate([[0.0], s[np.isfinite(s)]])
+        s = np.concatenate([np.zeros((len(n), 1)), q / square, constant / q], axis=1)
+    s[~np.isfinite(s)] = 0.0
     # In homogeneous coordinates (1, s), unit length; infinity is (0, ±1).
-    at = np.concatenate(
-        [np.stack([np.ones_like(s), s], axis=1) / np.hypot(1.0, s)[:, None], [[0, 1], [0, -1]]]
-    )
-    N, D = n @ at.T, d @ at.T
-    tiny = CLOSED * max(float(np.max(np.abs(n))), float(np.max(np.abs(d))))
+    at = np.stack([np.ones_like(s), s], axis=1) / np.hypot(1.0, s)[:, None]
+    at = np.concatenate([at, np.broadcast_to([[0.0, 0.0], [1.0, -1.0]], (len(n), 2, 2))], axis=2)
+    N, D = n @ at, d @ at
+    tiny = CLOSED * np.maximum(np.abs(n).max(axis=(1, 2)), np.abs(d).max(axis=(1, 2)))[:, None, None]
     none = tiny >= D
     ratio = np.where(none, np.where(np.abs(N) <= tiny, np.inf, -np.inf), N / np.where(none, 1.0, D))
     ratio = np.where(-tiny > D, -np.inf, ratio)
-    return float(np.max(np.min(ratio, axis=0)))
+    greatest: Array = ratio.min(axis=1).max(axis=1)
+    return greatest
 
 
 def _last(holds: Callable[[float], bool]) -> float:

@@ -1,7 +1,9 @@
 """The composite wrench cone of fingertips that push together, as its rays and its faces ([Zhou2017] Sec. 4.2)."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -11,7 +13,7 @@ from ..errors import InputError
 from ..friction.ellipsoid import Ellipsoid
 from ..friction.exact import Exact
 from ..friction.surface import LimitSurface, WrenchSet
-from ..geometry.pose import Array, cross
+from ..geometry.pose import Array
 from .point_contact import PointContact
 
 # Relative slack of the closed cone, above rounding and below any physical meaning.
@@ -44,7 +46,7 @@ class WrenchCone:
     @classmethod
     def of(cls, contacts: Sequence[PointContact]) -> "WrenchCone":
         """The cone of contacts in one frame, whose origin is the centre of friction."""
-        return cls.spanned([c.wrench(f) for c in contacts for f in c.force_edges()], lever_of(contacts))
+        return cls.spanned(edge_wrenches(contacts), lever_of(contacts))
 
     @classmethod
     def spanned(cls, wrenches: ArrayLike, lever: float) -> "WrenchCone":
@@ -97,17 +99,26 @@ class WrenchCone:
         Raises:
             InputError: if the cone holds a wrench and its opposite (fingers that squeeze), or lies in a plane.
         """
+        return self._order
+
+    @cached_property
+    def _order(self) -> Array:
         axis = self.axis
-        x = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-        x = x / np.linalg.norm(x)
-        flat = self.rays @ np.stack([x, np.cross(axis, x)], axis=1) / (self.rays @ axis)[:, None]
-        edges = _hull(flat)
+        least = int(np.argmin(np.abs(axis)))
+        x = np.eye(3)[least] - axis[least] * axis
+        y = [
+            axis[1] * x[2] - axis[2] * x[1],
+            axis[2] * x[0] - axis[0] * x[2],
+            axis[0] * x[1] - axis[1] * x[0],
+        ]
+        flat = self.rays @ np.stack([y, -x], axis=1) / (self.rays @ axis)[:, None]
+        edges = _hull(flat.tolist())
         if len(edges) < 3:
             raise InputError(
                 "the forces of the fingers lie in one plane: without friction, or at one place, two fingers have no"
                 " region of motions"
             )
-        return edges
+        return np.array(edges)
 
     @property
     def axis(self) -> Array:
@@ -125,25 +136,52 @@ class WrenchCone:
         return axis / size
 
 
-def _hull(points: Array) -> Array:
-    """Numbers of the corners of the convex hull of points (k, 2), counter-clockwise; of points on a line its two ends.
+def _hull(points: list[list[float]]) -> list[int]:
+    """Numbers of the corners of the convex hull of points, counter-clockwise; of points on a line its two ends.
 
     By monotone chains. For the few rays of a cone scipy's would take half a second to be imported.
     """
-    flat = _ON_EDGE * float(np.max(np.ptp(points, axis=0))) ** 2
-    order = np.lexsort(points.T[::-1]).tolist()
+    sizes = [max(values) - min(values) for values in zip(*points, strict=True)]
+    flat = _ON_EDGE * max(sizes) ** 2
+    order = sorted(range(len(points)), key=points.__getitem__)
     chains: list[list[int]] = []
     for way in (order, order[::-1]):
         chain: list[int] = []
         for i in way:
             while len(chain) > 1:
-                last = points[chain[-1]]
-                if cross(last - points[chain[-2]], points[i] - last) > flat:
+                (x0, y0), (x1, y1), (x2, y2) = points[chain[-2]], points[chain[-1]], points[i]
+                if (x1 - x0) * (y2 - y1) - (y1 - y0) * (x2 - x1) > flat:
                     break
                 chain.pop()
             chain.append(i)
         chains.append(chain[:-1])
-    return np.array(chains[0] + chains[1])
+    return chains[0] + chains[1]
+
+
+def edge_wrenches(contacts: Sequence[PointContact], margin: float = 0.0) -> Array:
+    """Wrenches of unit forces on the edges of contacts' friction cones, two for each (left, right), shape (n, 3).
+
+    The cones are those of (1 - margin) μ. Row by row c.wrench(f) for c in contacts for f in c.force_edges().
+    """
+    found = []
+    for contact in contacts:
+        nx, ny = contact.normal.tolist()
+        mu = (1 - margin) * contact.friction
+        cosine = 1 / math.hypot(1.0, mu)
+        for side in (mu, -mu):
+            found.append(_wrench(contact, cosine * (nx - side * ny), cosine * (ny + side * nx)))
+    return np.array(found)
+
+
+def axis_wrenches(contacts: Sequence[PointContact]) -> Array:
+    """Wrenches of unit forces along the inward normal and to its left, two for each of the contacts, shape (n, 3)."""
+    axes = [(contact, *contact.normal.tolist()) for contact in contacts]
+    return np.array([_wrench(c, *force) for c, nx, ny in axes for force in ((nx, ny), (-ny, nx))])
+
+
+def _wrench(contact: PointContact, fx: float, fy: float) -> list[float]:
+    x, y = contact.point.tolist()
+    return [fx, fy, x * fy - y * fx]
 
 
 def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:
@@ -155,12 +193,16 @@ def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:
     """
     if not 0 <= margin < 1:
         raise InputError("the friction margin is at least 0 and less than 1", value=margin)
-    return shared([replace(c, friction=(1 - margin) * c.friction) for c in contacts], 0.5 * margin)
+    return _shared(contacts, edge_wrenches(contacts, margin), 0.5 * margin)
 
 
 def shared(contacts: Sequence[PointContact], share: float) -> WrenchCone:
     """The composite cone of two contacts of which each bears at least a share (0 to 1/2) of the push."""
-    first, second = np.array([[c.wrench(f) for f in c.force_edges()] for c in contacts])
+    return _shared(contacts, edge_wrenches(contacts), share)
+
+
+def _shared(contacts: Sequence[PointContact], edges: Array, share: float) -> WrenchCone:
+    first, second = edges[:2], edges[2:]
     wrenches = np.concatenate([(1 - share) * first + share * second, share * first + (1 - share) * second])
     return WrenchCone.spanned(wrenches, lever_of(contacts))
 
@@ -201,24 +243,37 @@ def _straight_between(surface: LimitSurface, F: Array, G: Array) -> Array:
 
 def lever_of(contacts: Sequence[PointContact]) -> float:
     """The unit of length for torques: the distance of the farthest contact from the centre of friction [m]."""
-    return max(float(np.max([np.hypot(*c.point) for c in contacts])), 1e-300)
+    return max(*(math.hypot(*c.point.tolist()) for c in contacts), 1e-300)
 
 
 def _faces(rays: Array) -> Array:
     """Normals of the planes through two rays that have all others on one side; of a flat cone also its own edges."""
-    pairs = np.array(list(combinations(range(len(rays)), 2)))
-    found = _supporting(np.cross(rays[pairs[:, 0]], rays[pairs[:, 1]]), rays)
-    if len(found) and np.max(np.abs(rays @ found[0])) <= 1e-12:  # all rays in one plane
-        found = np.concatenate([found, _supporting(np.cross(found[0], rays), rays)])
+    few = rays.tolist()
+    found = _supporting([_cross(*pair) for pair in combinations(few, 2)], few)
+    if found and all(abs(_dot(ray, found[0])) <= 1e-12 for ray in few):  # all rays in one plane
+        found += _supporting([_cross(found[0], ray) for ray in few], few)
+    return np.array(found).reshape(-1, 3)
+
+
+def _supporting(normals: list[list[float]], rays: list[list[float]]) -> list[list[float]]:
+    """Those of ± the normals, as unit vectors, that no ray is behind."""
+    found = []
+    for normal in normals:
+        size = math.sqrt(_dot(normal, normal))
+        if size > 1e-12:
+            unit = [x / size for x in normal]
+            depths = [_dot(unit, ray) for ray in rays]
+            found += [unit] if min(depths) >= -1e-12 else []
+            found += [[-x for x in unit]] if max(depths) <= 1e-12 else []
     return found
 
 
-def _supporting(normals: Array, rays: Array) -> Array:
-    """Those of ± the normals, as unit vectors, that no ray is behind."""
-    sizes = np.linalg.norm(normals, axis=1)
-    units = normals[sizes > 1e-12] / sizes[sizes > 1e-12, None]
-    both = np.concatenate([units, -units])
-    return both[np.all(both @ rays.T >= -1e-12, axis=1)]
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: list[float], b: list[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _candidates(a: Array, b: Array, radius: float) -> list[Array]:

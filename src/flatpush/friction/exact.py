@@ -37,6 +37,11 @@ class Exact(LimitSurface):
     support: Support
     degree = 1
 
+    @property
+    def has_facets(self) -> bool:
+        """Whether it stands on feet."""
+        return isinstance(self.support.pressure, Feet)
+
     def value(self, wrench: ArrayLike) -> Array:
         """H(F) = max F·V / h(V), shape (...); exact to second order in the error of the twist."""
         F = _vectors(wrench, "a wrench")
@@ -58,8 +63,7 @@ class Exact(LimitSurface):
         if not np.all(np.any(flat != 0, axis=1)):
             raise InputError("a zero wrench has no twist of its own", value=wrench)
         flat[:, 2] = (flat[:, 2] - c[0] * flat[:, 1] + c[1] * flat[:, 0]) / ell
-        V = np.array([self._twist(f) for f in flat])
-        return self._about_origin(V).reshape(F.shape)
+        return self._about_origin(self._twists(flat)).reshape(F.shape)
 
     def is_vertex(self, wrench: ArrayLike) -> bool:
         """Whether a wrench (3,) has many twists, as collinear feet have for a push square to their line."""
@@ -151,22 +155,29 @@ class Exact(LimitSurface):
                     return np.asarray(V * (np.sign(F @ W) / np.sqrt(V @ V)))
         return None
 
-    def _twist(self, F: Array) -> Array:
-        F = F / np.sqrt(F @ F)
+    def _twists(self, wrenches: Array) -> Array:
+        """The unit twists of wrenches, both (n, 3) in units."""
+        wrenches = wrenches / np.sqrt(np.sum(wrenches * wrenches, axis=1))[:, None]
+        found = (
+            [self._at_feet(F) for F in wrenches] if isinstance(self._unit, Feet) else [None] * len(wrenches)
+        )
+        twists = np.array([np.zeros(3) if V is None else V for V in found])
+        free = np.array([V is None for V in found])
+        if free.any():
+            twists[free] = least_dissipation(self._unit, wrenches[free])
+        return twists / np.sqrt(np.sum(twists * twists, axis=1))[:, None]
+
+    def _at_feet(self, F: Array) -> Array | None:
+        """The twist of a unit wrench that points at a vertex, or of the facet that it lies on; None elsewhere."""
         vertex = self._vertex(F)
         if vertex is not None:
             return vertex
-        if isinstance(self._unit, Feet):
-            _, weights, turns, wrenches, h = self._facets
-            power = turns @ F
-            with np.errstate(divide="ignore", invalid="ignore"):
-                g = (h / power)[:, None] * F[:2] - wrenches[:, :2]
-                on = np.flatnonzero((power != 0) & (np.hypot(g[:, 0], g[:, 1]) <= weights + TIE))
-            if len(on):
-                V = turns[on[0]]
-                return V * (np.sign(power[on[0]]) / np.sqrt(V @ V))
-        V = least_dissipation(self._unit, F)
-        return V / np.sqrt(V @ V)
+        _, weights, turns, wrenches, h = self._facets
+        power = turns @ F
+        with np.errstate(divide="ignore", invalid="ignore"):
+            g = (h / power)[:, None] * F[:2] - wrenches[:, :2]
+            on = np.flatnonzero((power != 0) & (np.hypot(g[:, 0], g[:, 1]) <= weights + TIE))
+        return turns[on[0]] * np.sign(power[on[0]]) if len(on) else None
 
     def _stick(self, p: Array, u: Array) -> Array:
         k = np.array([p[1], -p[0], 1.0])

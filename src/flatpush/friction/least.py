@@ -1,6 +1,7 @@
 """The twist of least dissipation for a wrench: the inverse of Coulomb friction."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FlatpushError
 from ..geometry.pose import Array
@@ -15,17 +16,62 @@ _GOOD = 1e-12  # accepted if rounding lets it get no better
 _POOR = 1e-6  # refused; beside a foot at the relative distance ε the rounding of the twist costs 1e-16/ε
 
 
-def least_dissipation(pressure: Pressure, F: Array) -> Array:
-    """The V of least h(V) = ∫ |v| dN over F·V = 1, for a unit wrench F (3,) that lies on no facet.
+def least_dissipation(pressure: Pressure, wrenches: Array) -> Array:
+    """The V of least h(V) = ∫ |v| dN over F·V = 1, for unit wrenches F (n, 3) that lie on no facet, shape (n, 3).
 
-    Its wrench is a multiple of F, to about 1e-14. The pressure has a gyration radius of about 1, so that
+    Their wrenches are multiples of F, to about 1e-14. The pressure has a gyration radius of about 1, so that
     forces and torques compare.
 
     Raises:
         FlatpushError: if it does not converge.
     """
+    if len(wrenches) == 1:
+        return _alone(pressure, wrenches[0], wrenches[0])[None]
+    V, arrived = _newton_together(pressure, wrenches)
+    for i in np.flatnonzero(~arrived):
+        V[i] = _alone(pressure, wrenches[i], V[i])
+    return V
+
+
+def _newton_together(pressure: Pressure, wrenches: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The damped steps of _newton for many wrenches (n, 3) at once: the twists (n, 3), and which have arrived."""
+    V, Z = wrenches.copy(), np.array([_plane(F) for F in wrenches])
+    arrived = np.zeros(len(V), dtype=bool)
+    which, fraction = np.arange(len(V)), np.ones(len(V))
+    h, g, H = _on_planes(pressure, V, Z)
+    size = np.sum(g * g, axis=1)
+    for _ in range(2 * _BEFORE_FEET if isinstance(pressure, Feet) else 2 * _MAX_STEPS):
+        arrived[which] = done = size <= (_DONE * h) ** 2
+        if done.any():
+            which, Z, fraction, h, g, H, size = (x[~done] for x in (which, Z, fraction, h, g, H, size))
+        if not len(which):
+            break
+        a, b, c = H[:, 0, 0], H[:, 0, 1], H[:, 1, 1]
+        lift = 1e-14 * (a + c) + 1e-300
+        a, c = a + lift, c + lift
+        det = a * c - b * b
+        step = np.stack([b * g[:, 1] - c * g[:, 0], b * g[:, 0] - a * g[:, 1]], axis=1) / det[:, None]
+        V1 = V[which] + np.einsum("nij,nj->ni", Z, fraction[:, None] * step)
+        h1, g1, H1 = _on_planes(pressure, V1, Z)
+        size1, slope, descent = (np.sum(x, axis=1) for x in (g1 * g1, g1 * step, g * step))
+        level = (slope <= -0.5 * descent) & (h1 <= h * (1 + 1e-12)) & (size1 < size)
+        moved = (slope <= 0) | (h1 <= h + 1e-4 * fraction * descent) | level
+        rounded = (size <= (_GOOD * h) ** 2) & (~moved | (size1 >= size))
+        arrived[which[rounded]] = True
+        moved &= ~rounded
+        V[which[moved]] = V1[moved]
+        fraction = np.where(moved, 1.0, 0.5 * fraction)
+        h, size = np.where(moved, h1, h), np.where(moved, size1, size)
+        g, H = np.where(moved[:, None], g1, g), np.where(moved[:, None, None], H1, H)
+        on = ~rounded & (det > 0)
+        if not on.all():
+            which, Z, fraction, h, g, H, size = (x[on] for x in (which, Z, fraction, h, g, H, size))
+    return V, arrived
+
+
+def _alone(pressure: Pressure, F: Array, V: Array) -> Array:
+    """The same for one wrench (3,), from a twist (3,) with F·V = 1."""
     Z = _plane(F)
-    V = F.copy()  # for a force through the centre this is the answer, a translation
     feet = isinstance(pressure, Feet)
     V, residual = _newton(pressure, V, Z, _BEFORE_FEET if feet else _MAX_STEPS)
     if residual > _DONE and isinstance(pressure, Feet):
@@ -121,6 +167,11 @@ def _plane(F: Array) -> Array:
     a /= np.sqrt(a @ a)
     b = np.array([F[1] * a[2] - F[2] * a[1], F[2] * a[0] - F[0] * a[2], F[0] * a[1] - F[1] * a[0]])
     return np.stack([a, b], axis=1)
+
+
+def _on_planes(pressure: Pressure, V: Array, Z: Array) -> tuple[Array, Array, Array]:
+    h, W, K = pressure.resist(V)
+    return h, np.einsum("ni,nij->nj", W, Z), np.swapaxes(Z, 1, 2) @ K @ Z
 
 
 def _on_plane(pressure: Pressure, V: Array, Z: Array) -> tuple[float, Array, Array]:

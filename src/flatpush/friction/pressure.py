@@ -63,6 +63,17 @@ class Pressure(ABC):
         h[~far], W[~far], K[~far] = self._by_integrals(V[~far])
         return h, W, K
 
+    def wrench(self, twist: Array) -> Array:
+        """∇h of the twists (m, 3), shape (m, 3), as resist has it."""
+        V = twist
+        far = V[:, 0] ** 2 + V[:, 1] ** 2 >= (POINT_LIKE * self.radius * V[:, 2]) ** 2
+        W = np.empty((len(V), 3))
+        if far.any():
+            W[far] = _forces_at_nodes(*self.nodes, 0.0, V[far])[1]
+        if not far.all():
+            W[~far] = self._by_integrals(V[~far])[1]
+        return W
+
     def _by_integrals(self, V: Array) -> tuple[Array, Array, Array]:
         w = V[:, 2:]
         lever = -V[:, :2] / w  # the rotation centre c turned by +90°: (-cy, cx)
@@ -103,6 +114,9 @@ class Feet(Pressure):
 
     def resist(self, twist: Array) -> tuple[Array, Array, Array]:
         return _by_nodes(self.points, self.weights, self.near * self.radius, twist)
+
+    def wrench(self, twist: Array) -> Array:
+        return _forces_at_nodes(self.points, self.weights, self.near * self.radius, twist)[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +281,18 @@ def _compressed(points: Array, weights: Array, radius: float) -> tuple[Array, Ar
 
 def _by_nodes(points: Array, weights: Array, near: float, V: Array) -> tuple[Array, Array, Array]:
     """Sums over point loads. Those within the distance `near` of the rotation centre rest and add nothing."""
+    h, W, along, inverse = _forces_at_nodes(points, weights, near, V)
+    # n × the Jacobian with n normal to the velocity: (-uy, ux, p·u).
+    across = np.empty_like(along)
+    across[:, 0], across[:, 1] = -along[:, 1], along[:, 0]
+    across[:, 2] = points[:, 0] * along[:, 0] + points[:, 1] * along[:, 1]
+    return h, W, (across * (weights * inverse)[:, None, :]) @ np.swapaxes(across, 1, 2)
+
+
+def _forces_at_nodes(
+    points: Array, weights: Array, near: float, V: Array
+) -> tuple[Array, Array, Array, Array]:
+    """h, ∇h, the directions of the forces of n points with their moments (m, 3, n), and one over the speeds (m, n)."""
     x, y = points.T
     w = V[:, 2:]
     vx, vy = V[:, :1] - w * y, V[:, 1:2] + w * x
@@ -277,12 +303,8 @@ def _by_nodes(points: Array, weights: Array, near: float, V: Array) -> tuple[Arr
     else:
         inverse = 1.0 / speed
     ux, uy = vx * inverse, vy * inverse
-    # Force directions and their moments; and n × the Jacobian with n normal to the velocity: (-uy, ux, p·u).
-    along, across = np.empty((2, len(V), 3, len(x)))
-    along[:, 0], along[:, 1], along[:, 2] = ux, uy, x * uy - y * ux
-    across[:, 0], across[:, 1], across[:, 2] = -uy, ux, x * ux + y * uy
-    K = (across * (weights * inverse)[:, None, :]) @ np.swapaxes(across, 1, 2)
-    return speed @ weights, along @ weights, K
+    along = np.stack([ux, uy, x * uy - y * ux], axis=1)
+    return speed @ weights, along @ weights, along, inverse
 
 
 def _elliptic(m: Array, k1: Array) -> tuple[Array, Array]:

@@ -167,7 +167,7 @@ class Support:
             raise InputError("a zero twist has no wrench of its own", value=twist)
         if not (is_finite(friction) and is_finite(load) and friction >= 0 and load >= 0):
             raise InputError("friction and load are finite and not negative", value=(friction, load))
-        W = self.pressure.resist(flat)[1].reshape(V.shape)
+        W = self.pressure.wrench(flat).reshape(V.shape)
         W[..., 2] += self.centre[0] * W[..., 1] - self.centre[1] * W[..., 0]
         return (friction * load) * W
 

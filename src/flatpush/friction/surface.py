@@ -36,6 +36,11 @@ class LimitSurface(ABC):
 
     degree: int
 
+    @property
+    def has_facets(self) -> bool:
+        """Whether some twists have many wrenches, so that wrench_set may be more than one."""
+        return False
+
     @abstractmethod
     def value(self, wrench: ArrayLike) -> Array:
         """H(F), shape (...)."""
@@ -51,6 +56,12 @@ class LimitSurface(ABC):
     def wrench_set(self, twist: ArrayLike) -> WrenchSet:
         """All wrenches with H = 1 of one twist of shape (3,)."""
         return WrenchSet(self.wrench(twist), np.zeros(2), 0.0)
+
+    def wrench_sets(self, twists: Array) -> list[WrenchSet]:
+        """wrench_set of many twists, shape (n, 3)."""
+        if self.has_facets:
+            return [self.wrench_set(V) for V in twists]
+        return [WrenchSet(W, np.zeros(2), 0.0) for W in self.wrench(twists)]
 
     def is_vertex(self, wrench: ArrayLike) -> bool:
         """Whether a wrench of shape (3,) has many twists, so that a force alone does not determine the motion."""

@@ -1,6 +1,7 @@
 """What a plan claims, computed from its scene and its segments alone."""
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from ..problem import CarCentres, Certificate, PushSegment, Scene, Segment, Slid
 from ..problem.mechanics import (
     cone_motions,
     contact_at,
-    contacts_of,
     divergence_length,
     named,
     placement_of,
@@ -22,8 +22,8 @@ from ..problem.mechanics import (
 )
 from ..problem.scene import Uncertainty
 from .clearance import clearance_of
-from .cone_margins import cone_margins
-from .margins import Margins, contact_margins, two_finger_margins, worse_of
+from .judged_motions import JudgedMotion, margins_of
+from .margins import Margins, worse_of
 from .pieces import progress, turns_along
 from .proof import offset_end, proof_of
 from .slides import plant_of_slides, rolled_out, sensitivity_of
@@ -46,9 +46,9 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
     """
     pushes = [s for s in segments if isinstance(s, PushSegment)]
     pose = np.asarray(scene.start, dtype=float)
-    worst = Margins()
     cars: dict[str, CarCentres] = {}
     judged: set[tuple[object, ...]] = set()
+    motions: list[JudgedMotion] = []
     cost, growth, previous = 0.0, None, None
     slides = any(isinstance(s, SlideSegment) for s in segments)
     plant = plant_of_slides(scene) if slides else None
@@ -78,13 +78,7 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
             if what in judged:
                 continue
             judged.add(what)
-            if cone:
-                found = cone_margins(contacts_of(scene, placement), surface, at.point, twist)
-            else:
-                found = contact_margins(scene, surface, at, twist)
-            if len(placement.points) == 2:
-                found = worse_of(found, two_finger_margins(scene, placement, twist))
-            worst = worse_of(worst, found)
+            motions.append(JudgedMotion(placement, surface, cone, at, twist))
         cost += sum(arc_costs(scene, segment, cars[segment.push]))
         for arc in segment.arcs:
             pose = compose(pose, exp(arc.duration * arc.twist))
@@ -93,6 +87,7 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
                          * a.duration for a in segment.arcs)  # fmt: skip
             factor = float(np.exp(length / divergence_length(scene.object, contact)))
             growth = max(growth or 1.0, factor)
+    worst = reduce(worse_of, margins_of(scene, motions), Margins())
     transits = [s for s in segments if isinstance(s, TransitSegment)]
     if scene.planning.cost == "time":
         cost += sum(float(s.times[-1]) for s in transits)

@@ -1,10 +1,12 @@
 """How far the motions of a push are from their limits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..contact import Placement, PointContact, beyond_slider, composite_margin
+from ..contact import Placement, PointContact, beyond_slider
+from ..contact.two_point import composite_margins
 from ..friction.surface import LimitSurface
 from ..geometry import rotate, velocity_at
 from ..geometry.pose import Array
@@ -67,14 +69,16 @@ def contact_margins(scene: Scene, surface: LimitSurface, contact: PointContact, 
     )
 
 
-def two_finger_margins(scene: Scene, placement: Placement, twist: Array) -> Margins:
-    """What both contacts make of a twist (3,) about the COF under the believed surface, and whatever the pressure."""
-    contacts = contacts_of(scene, placement)
-    beyond = beyond_slider(contacts, slider_of(scene.object), twist)
-    return Margins(
-        composite=composite_margin(contacts, true_surface(scene.object), twist),
-        unique=beyond if beyond is not None and np.isfinite(beyond) else None,
-    )
+def two_finger_margins(scene: Scene, placements: Sequence[Placement], twists: Array) -> list[Margins]:
+    """What both contacts make of twists (n, 3) about the COF under the believed surface, and whatever the pressure."""
+    pairs, slider = [contacts_of(scene, placement) for placement in placements], slider_of(scene.object)
+    composites = composite_margins(pairs, true_surface(scene.object).wrench_sets(twists))
+    found = []
+    for contacts, composite, twist in zip(pairs, composites, twists, strict=True):
+        beyond = beyond_slider(contacts, slider, twist)
+        known = beyond if beyond is not None and np.isfinite(beyond) else None
+        found.append(Margins(composite=composite, unique=known))
+    return found
 
 
 def _curvature_margin(surface: LimitSurface, contact: PointContact, twist: Array) -> float:
