@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...contact import kept_angle
-from ...geometry import cross, perpendicular, rotate, shift_twist, velocity_at
+from ...geometry import perpendicular
 from ...geometry.pose import Array
-from ...steering.car import Car
 from ..laws.steering_model import SteeringModel
+from .turning import Turning
 
 # The contact has to lie so far from the centre of friction, by the tip's own size of it, to have an axle.
 _LEAST = 1e-9
-# Places at which the drift is computed.
+# Turns at which the drift is computed.
 _SAMPLES = 21
 
 
@@ -24,11 +24,12 @@ class ContactCar:
 
     With φ the angle of the force from the way to the centre of friction, counter-clockwise, r the distance to it and β
     the angle of the inward normal, the object turns about the point ρ/r beyond the centre and -ρ cot φ / r to the left
-    (docs/errata.md, general closed forms); the contact sticks while |φ - β| ≤ arctan μ.
+    (docs/errata.md, general closed forms); the contact sticks while |φ - β| ≤ arctan μ. Other limit surfaces have their
+    own function of φ in place of the tangent, see Turning.
 
     Attributes:
         model: flat point midway between the turning centres with the reserve; its turns are the limits.
-        radius: turning radius with the reserve [m].
+        radius: turning radius with the reserve [m]. reserve: the fraction of μ that this is.
         contact, normal: of the outline, in O, shape (2,).
         leeway: angle from the straight force to the nearer edge of the friction cone, by the cone's half angle: 1 in
             its middle, 0 on an edge.
@@ -36,10 +37,12 @@ class ContactCar:
 
     model: SteeringModel
     radius: float
+    reserve: float
     contact: Array
     normal: Array
     leeway: float
     _force: tuple[float, float, float]  # ρ/r, the flat point's way to the left of the centre, β
+    _turning: Turning | None
 
     @property
     def centres(self) -> Array:
@@ -50,7 +53,8 @@ class ContactCar:
     def ratio(self, curvature: float) -> float:
         """|tangential| / normal force that a turn per length of the flat path asks for."""
         level, along, beta = self._force
-        phi = 0.0 if curvature == 0 else -math.atan(level / (1 / curvature + along))
+        tangent = 0.0 if curvature == 0 else -level / (1 / curvature + along)
+        phi = math.atan(tangent) if self._turning is None else float(self._turning.angle(tangent, beta))
         return abs(math.tan(phi - beta))
 
 
@@ -64,9 +68,7 @@ def contact_car(
     *,
     reserve: float = 0.4,
     edge: float = 0.2,
-    sides: tuple[float, float] = (1.0, 1.0),
-    edges: tuple[float, float] = (1.0, 1.0),
-    drift: Array | None = None,
+    turning: Turning | None = None,
     turns: bool = True,
 ) -> ContactCar | None:
     """The car of a contact, or None where it cannot turn both ways.
@@ -77,8 +79,8 @@ def contact_car(
         friction: between finger and object.
         reserve: fraction of μ that plans keep in reserve.
         edge: the same fraction for what feedback may use.
-        sides, edges: how much farther than that the turning centres lie on the left and on the right, with the reserve
-            and at the edge: limit surfaces are no ellipsoids. See sides_of.
+        turning: of a limit surface that is no ellipsoid.
+        turns: whether the pusher turns with the object.
 
     >>> car = contact_car([0, -0.02], [0, 1], [0, 0], 2e-4, 0.5, 0.0, reserve=0.0, edge=0.0)
     >>> round(car.radius, 9), car.model.flat_point.round(9).tolist()  # ρ/(μ r), (0, ρ/r)
@@ -103,65 +105,44 @@ def contact_car(
     if abs(beta) >= kept_angle(friction, max(reserve, edge)):
         return None
 
-    def centres(margin: float, share: tuple[float, float]) -> tuple[float, float]:
+    def centres(margin: float) -> tuple[float, float] | None:
         kept = kept_angle(friction, margin)
-        return -share[0] * level / math.tan(beta - kept), -share[1] * level / math.tan(beta + kept)
+        low, high = (
+            math.tan(a) if turning is None else turning.tangent(a) for a in (beta - kept, beta + kept)
+        )
+        return (-level / low, -level / high) if low < 0 < high else None
 
-    far, near = centres(reserve, sides)
-    along, radius = 0.5 * (far + near), 0.5 * (far - near)
-    most_left, most_right = centres(edge, edges)
-    if not most_right < along < most_left:
+    planned, limits = centres(reserve), centres(edge)
+    if planned is None or limits is None:
         return None
+    along, radius = 0.5 * (planned[0] + planned[1]), 0.5 * (planned[0] - planned[1])
+    if not limits[1] < along < limits[0]:
+        return None
+    most_left, most_right = 1 / (limits[0] - along), 1 / (along - limits[1])
+    drift = None
+    if turning is not None:
+        turn = np.linspace(-most_right, most_left, _SAMPLES)
+        tangents = -level * turn / (1 + turn * along)
+        drift = turning.drift(tangents, beta) / (1 + tangents * along / level)
     point = np.array([cx + level * hx - along * hy, cy + level * hy + along * hx])
     pusher = np.array([px - tip_radius * nx, py - tip_radius * ny, math.atan2(ny, nx)])
     model = SteeringModel(
         point,
         math.atan2(hy, hx),
-        1 / (most_left - along),
-        1 / (along - most_right),
+        most_left,
+        most_right,
         np.array([px, py]),
         pusher,
         turns,
         drift,
     )
     return ContactCar(
-        model, radius, np.array([px, py]), np.array([nx, ny]), min(left, -right) / half, (level, along, beta)
+        model,
+        radius,
+        reserve,
+        np.array([px, py]),
+        np.array([nx, ny]),
+        min(left, -right) / half,
+        (level, along, beta),
+        turning,
     )
-
-
-def sides_of(car: Car, friction: float, margin: float) -> tuple[float, tuple[float, float]]:
-    """ρ such that the axle of diag(1, 1, 1/ρ) is that of a car, and how much farther its turning centres are.
-
-    Args:
-        car: with a margin of its friction cone.
-    """
-    to = -car.contact.point
-    r = float(np.hypot(*to))
-    h, kept = to / r, kept_angle(friction, margin)
-    rho = r * float((car.flat_point - car.cof) @ h)
-    beta = float(np.arctan2(cross(h, car.contact.normal), h @ car.contact.normal))
-    shares = []
-    for centre, angle in ((car.left_centre, beta - kept), (car.right_centre, beta + kept)):
-        left = float(cross(h, centre - car.cof))
-        shares.append(left * r / (-rho / math.tan(angle)))
-    return rho, (shares[0], shares[1])
-
-
-def drift_of(car: Car, model: SteeringModel) -> Array:
-    """How far the flat point of a model moves to its left, per length, at turns evenly from -right to left, shape (n,).
-
-    Args:
-        car: of the same push, with a margin no greater than that of the model's limits.
-    """
-    first, _, last = car.contact.force_angles(car.forces)
-    h, turns, drifts = model.direction, [], []
-    for share in np.linspace(0.0, 1.0, _SAMPLES):
-        force = rotate(last + share * (first - last), car.contact.normal)
-        V = shift_twist(car.surface.twist(car.contact.wrench(force)), -car.cof)
-        v = velocity_at(V, model.flat_point)
-        ahead = float(v @ h)
-        turns.append(float(V[2]) / ahead)
-        drifts.append(float(cross(h, v)) / ahead)
-    order = np.argsort(turns)
-    curvatures = np.linspace(-model.right, model.left, _SAMPLES)
-    return np.interp(curvatures, np.array(turns)[order], np.array(drifts)[order])

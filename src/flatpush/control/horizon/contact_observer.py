@@ -19,6 +19,9 @@ from .state import HorizonState, LearningWindow
 EDGE = 0.2
 # Of a frame, so much counts against what was expected: position, angle, and the place of the finger on the object.
 POSITION_GAIN, ANGLE_GAIN, PLACE_GAIN = 0.25, 0.2, 0.15
+# Of the reserve of plans and the edge of feedback, plans keep the share that is listed first and makes the turns no
+# wider than so many times those at the edge; with the force for straight on in the middle of the cone that is all.
+SHARES, WIDER = (1.0, 0.5, 0.0), 1.6
 # A finger farther from the edge has lost it [m].
 LOST = 0.0007
 # A contact that has moved so far along the edge has slipped [m].
@@ -73,7 +76,8 @@ class ContactObserver:
                 state = self.learned(state, window, np.asarray(frame.object, dtype=float), self.sd, tip)
                 state = replace(state, window=LearningWindow(float(frame.object[2]), self.sd, tip))
         gap = nearest_contact(self.scene.object.outline, tip)[2] - self.scene.pusher.tip_radius
-        return replace(state, car=self.car(state, state.push, tip), gap=gap)
+        car = self.car(state, state.push, tip, state.car.reserve) or self.car(state, state.push, tip, EDGE)
+        return replace(state, car=car, gap=gap)
 
     def _at_edge(self, car: ContactCar, pose: Array, hand: Array) -> Array:
         """A pose moved along the normal so that the finger touches the edge, if it is near enough to do so."""
@@ -86,8 +90,29 @@ class ContactObserver:
             return pose
         return np.array([pose[0] - gap * nx, pose[1] - gap * ny, pose[2]])
 
-    def car(self, state: HorizonState, push: int, tip: ArrayLike) -> ContactCar | None:
-        """Of a finger of a push whose centre is at a place in O, as far as is now known."""
+    def landing(self, state: HorizonState, push: int, tip: ArrayLike) -> ContactCar | None:
+        """Of a finger that lands there, with as much reserve as leaves it turns that are worth it.
+
+        Where the force for straight on lies near an edge of the cone, the whole reserve leaves no turn to that side, or
+        one so wide that every way is a long one.
+        """
+        widest = self.car(state, push, tip, EDGE)
+        if widest is None:
+            return None
+        for share in SHARES:
+            car = self.car(state, push, tip, EDGE + share * (self._reserve - EDGE))
+            if car is not None and car.radius <= WIDER * widest.radius:
+                return car
+        return widest
+
+    @property
+    def _reserve(self) -> float:
+        return max(EDGE, self.scene.planning.friction_margin)
+
+    def car(
+        self, state: HorizonState, push: int, tip: ArrayLike, reserve: float | None = None
+    ) -> ContactCar | None:
+        """Of a finger of a push whose centre is at a place in O, as far as is now known; None: with all the reserve."""
         point, normal, _ = nearest_contact(self.scene.object.outline, tip)
         known, believed = state.steering[push], self.scene.object.friction
         low, high = (1 - SPREAD) * believed, (1 + SPREAD) * believed
@@ -99,11 +124,9 @@ class ContactObserver:
             known.rho,
             friction,
             self.scene.pusher.tip_radius,
-            reserve=self.scene.planning.friction_margin,
+            reserve=self._reserve if reserve is None else reserve,
             edge=EDGE,
-            sides=known.sides,
-            edges=known.edges,
-            drift=known.drift,
+            turning=known.turning,
             turns=self.scene.pusher.turns,
         )
 

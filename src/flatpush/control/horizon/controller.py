@@ -21,7 +21,7 @@ from ..loop.frames import hand, mean_pose, predicted
 from ..loop.limits import Limits, beyond, braking
 from ..loop.measurement import Command, Measurement
 from .contact_car import ContactCar
-from .contact_observer import EDGE, LOST, ContactObserver, nearest_contact
+from .contact_observer import LOST, ContactObserver, nearest_contact
 from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
 from .state import HorizonState, LearningWindow
@@ -163,7 +163,7 @@ class HorizonController(AbstractController[HorizonState]):
             reasons = "; ".join(f"{name}: {why}" for name, why in planner.reasons.items())
             raise InputError(f"no push of this scene can be steered. {reasons}")
         waits = 0.5 + latency if stale is None else stale
-        prior = tuple(steering_of(planner.scene, option, EDGE) for option in planner.usable)
+        prior = tuple(steering_of(planner.scene, option) for option in planner.usable)
         around = Surroundings(planner.scene, planner.usable) if crowded else None
         return cls(
             planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits, surroundings=around
@@ -334,7 +334,7 @@ class HorizonController(AbstractController[HorizonState]):
         for k, option in enumerate(self.planner.usable):
             assert option.placement is not None
             car = (
-                self.observer.car(state, k, option.placement.tips[0])
+                self.observer.landing(state, k, option.placement.tips[0])
                 if state.failures[k] < FAILURES
                 else None
             )

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry.pose import Array
-from ...planning.options import PushOption, push_option
+from ...planning.options import PushOption
 from ...problem import Scene
 from ..learning.belief import SD_COF, SD_RHO, SteeringBelief, SteeringEstimate
-from .contact_car import contact_car, drift_of, sides_of
+from .turning import Turning, axle_of, turning_of
 
 # What was learned is used once it knows the heading of the axle so much better than the prior.
 BETTER = 0.9
@@ -22,15 +22,13 @@ class Steering:
 
     Attributes:
         cof, rho: centre of friction in O and ρ [m²], as far as is known now: the prior, or what was learned.
-        sides, edges, drift: see contact_car.
+        turning: of its limit surface, at the place where it lands.
         point: the contact where it lands. belief: what its own motions tell. prior: what was believed before them.
     """
 
     cof: Array
     rho: float
-    sides: tuple[float, float]
-    edges: tuple[float, float]
-    drift: Array | None
+    turning: Turning
     point: Array
     belief: SteeringBelief
     prior: SteeringEstimate
@@ -40,25 +38,14 @@ class Steering:
         return replace(self, belief=self.belief.observed(point, displacement, covariance))
 
 
-def steering_of(scene: Scene, option: PushOption, edge: float) -> Steering:
-    """The prior of a push, from its cars with the scene's margin and with what feedback leaves of the cone at least."""
-    car, wide = option.car, push_option(scene, option.push, margin=edge).car
+def steering_of(scene: Scene, option: PushOption) -> Steering:
+    """The prior of a push."""
+    car, place = option.car, option.placement
     assert car is not None
-    assert option.placement is not None
-    mu = scene.object.friction
-    rho, sides = sides_of(car, mu, scene.planning.friction_margin)
-    edges = sides
-    if wide is not None:
-        other, edges = sides_of(wide, mu, edge)
-        edges = edges[0] * other / rho, edges[1] * other / rho
-    point, normal = option.placement.points[0], option.placement.normals[0]
-    now = contact_car(
-        point, normal, car.cof, rho, mu, scene.pusher.tip_radius,
-        reserve=scene.planning.friction_margin, edge=edge, sides=sides, edges=edges,
-    )  # fmt: skip
-    drift = None if now is None else drift_of(car if wide is None else wide, now.model)
+    assert place is not None
+    rho = axle_of(car)
     prior = SteeringBelief.prior(car.cof, rho, SD_COF * scene.object.outline.size, SD_RHO * rho)
-    return Steering(car.cof, rho, sides, edges, drift, point, prior, prior.estimate())
+    return Steering(car.cof, rho, turning_of(car, rho), place.points[0], prior, prior.estimate())
 
 
 def shared(pushes: Sequence[Steering], only: int | None = None) -> tuple[Steering, ...]:
