@@ -14,6 +14,8 @@ from ..errors import InputError
 MOST_BYTES = 10_000_000
 MOST_LEVELS = 60
 MOST_ENTRIES = 100_000  # of one list; samples of a plan may be more
+# What most of the entries of long lists are: nothing in them is looked for.
+_PLAIN = frozenset((float, int, bool, str, type(None)))
 
 # The plain scalars of YAML 1.2: unlike in YAML 1.1, 1e-3 is a number, on and off are words and 010 is ten.
 _INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -113,7 +115,9 @@ def plain(value: object, source: str = "", key: str = "", level: int = 0) -> obj
     if isinstance(value, Mapping):
         return {str(k): plain(v, source, join(key, str(k)), level + 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(v, source, join(key, i), level + 1) for i, v in enumerate(value)]
+        return [
+            v if type(v) in _PLAIN else plain(v, source, join(key, i), level + 1) for i, v in enumerate(value)
+        ]
     return value
 
 
@@ -157,7 +161,10 @@ def _unpaired(value: Any, source: str, path: str, level: int, longest: int) -> A
         return result
     if isinstance(value, list):
         _refuse_long(len(value), longest, source, path)
-        return [_unpaired(item, source, join(path, i), level + 1, longest) for i, item in enumerate(value)]
+        return [
+            v if type(v) in _PLAIN else _unpaired(v, source, join(path, i), level + 1, longest)
+            for i, v in enumerate(value)
+        ]
     return value
 
 
