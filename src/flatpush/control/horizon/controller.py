@@ -39,7 +39,8 @@ FRAMES = 10
 GOAL_SHARE = 0.85
 # A finger that had lost the edge has it again when it is as near as this [m].
 REGAINED = 0.0001
-# Where the car of a contact that slipped turns so much less tightly than where it landed, another landing is better.
+# Where the car of a contact that slipped turns so much less tightly than where it landed, another landing is better;
+# where what was learned makes it so much worse than was believed, another push.
 WORSE = 2.5
 # Contacts are found again so often in one push before another landing is tried.
 RESUMES = 5
@@ -232,6 +233,9 @@ class HorizonController(AbstractController[HorizonState]):
         if not any(cars):
             state = self._forgotten(state)
             cars = self._usable(state)
+        if not any(cars) and state.forgiven:
+            state = self._forgotten(state)
+            cars = self._usable(state)
         cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         if self.surroundings is not None:
             return self._land_among(state, self.surroundings, cars, pose, text, time)
@@ -325,20 +329,24 @@ class HorizonController(AbstractController[HorizonState]):
         return self._go(replace(state, note=note), time)
 
     def _forgotten(self, state: HorizonState) -> HorizonState:
-        """Better what failed than nothing: it may go well from here, and what was learned may be wrong."""
-        return replace(state, failures=(0,) * len(self.prior), steering=self.prior, bounds=FrictionBounds())
+        """Better what failed than nothing: it may go well from here. Where it did not, or nothing failed, what was
+        learned may be wrong."""
+        none = (0,) * len(self.prior)
+        if any(state.failures) and not state.forgiven:
+            return replace(state, failures=none, forgiven=True)
+        return replace(state, failures=none, forgiven=False, steering=self.prior, bounds=FrictionBounds())
 
     def _usable(self, state: HorizonState) -> list[ContactCar | None]:
         """The cars of the pushes at their places, as far as is known now; None for those that are left out."""
+        fresh = replace(state, failures=(0,) * len(self.prior), steering=self.prior, bounds=FrictionBounds())
         cars: list[ContactCar | None] = []
         for k, option in enumerate(self.planner.usable):
             assert option.placement is not None
-            car = (
-                self.observer.landing(state, k, option.placement.tips[0])
-                if state.failures[k] < FAILURES
-                else None
-            )
-            cars.append(car if car is not None and car.leeway >= LEEWAY else None)
+            tip = option.placement.tips[0]
+            car = self.observer.landing(state, k, tip) if state.failures[k] < FAILURES else None
+            hoped = self.observer.landing(fresh, k, tip)
+            good = car is not None and car.leeway >= LEEWAY
+            cars.append(car if good and (hoped is None or car.radius <= WORSE * hoped.radius) else None)
         return cars
 
     def _has_room(self, pose: Array, option: int) -> bool:
@@ -440,7 +448,7 @@ class HorizonController(AbstractController[HorizonState]):
                 self.tolerance,
             )
         if rest.how == "past" or allowed < 0:
-            return self._retreat(state, time, "the end of this push")
+            return self._retreat(replace(state, forgiven=False), time, "the end of this push")
         arm = m.arm
         # The finger runs as fast as it may; it comes to rest at the end.
         ratio = math.hypot(

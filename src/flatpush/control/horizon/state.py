@@ -54,7 +54,8 @@ class HorizonState(ControllerState):
         stuck: how often no way was found since the last.
         landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
             object or the finger would have left the bounds.
-        failures: how often the finger slipped, or lost the edge too often, at every option.
+        failures: how often the finger slipped, or lost the edge too often, at every option. forgiven: whether they were
+            forgotten since the last push that came to its end.
         steering: of every option. bounds: of the friction between finger and object. window: see LearningWindow.
     """
 
@@ -79,6 +80,7 @@ class HorizonState(ControllerState):
     resumes: int = 0
     stopped: int = 0
     failures: tuple[int, ...] = ()
+    forgiven: bool = False
     steering: tuple[Steering, ...] = ()
     bounds: FrictionBounds = field(default_factory=FrictionBounds)
     window: LearningWindow | None = None
