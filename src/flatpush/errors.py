@@ -42,5 +42,8 @@ class MissingExtra(FlatpushError, ImportError):
 def _short(value: object, most: int = 80) -> str:
     # Arrays and numpy's numbers are shown as plain lists and numbers.
     plain = getattr(value, "tolist", None)
-    text = repr(value if plain is None else plain())
+    found = value if plain is None else plain()
+    if isinstance(found, list | tuple | str):
+        found = found[:most]  # every entry takes a place at least, and the rest would not be shown
+    text = repr(found)
     return text if len(text) <= most else text[: most - 1] + "…"
