@@ -56,7 +56,7 @@ class ContactObserver:
                 # While the finger is off the object this rests: the frames are averaged.
                 state = replace(state, frames=(*state.frames, np.asarray(frame.object, dtype=float)))
             return replace(state, believed=frame)
-        model, dt = state.car.model, frame.time - before.time
+        model, reserve, dt = state.car.model, state.car.reserve, frame.time - before.time
         u = (np.asarray(frame.pusher, dtype=float) - before.pusher) / dt
         x, y, turn = (float(v) for v in before.object)
         n = model.pusher[2] + turn
@@ -76,7 +76,7 @@ class ContactObserver:
                 state = self.learned(state, window, np.asarray(frame.object, dtype=float), self.sd, tip)
                 state = replace(state, window=LearningWindow(float(frame.object[2]), self.sd, tip))
         gap = nearest_contact(self.scene.object.outline, tip)[2] - self.scene.pusher.tip_radius
-        car = self.car(state, state.push, tip, state.car.reserve) or self.car(state, state.push, tip, EDGE)
+        car = self.car(state, state.push, tip, reserve) or self.car(state, state.push, tip, EDGE)
         return replace(state, car=car, gap=gap)
 
     def _at_edge(self, car: ContactCar, pose: Array, hand: Array) -> Array:

@@ -345,8 +345,9 @@ class HorizonController(AbstractController[HorizonState]):
             tip = option.placement.tips[0]
             car = self.observer.landing(state, k, tip) if state.failures[k] < FAILURES else None
             hoped = self.observer.landing(fresh, k, tip)
-            good = car is not None and car.leeway >= LEEWAY
-            cars.append(car if good and (hoped is None or car.radius <= WORSE * hoped.radius) else None)
+            widest = math.inf if hoped is None else WORSE * hoped.radius
+            good = car is not None and car.leeway >= LEEWAY and car.radius <= widest
+            cars.append(car if good else None)
         return cars
 
     def _has_room(self, pose: Array, option: int) -> bool:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...geometry import perpendicular, rotate, shift_twist, velocity_at
 from ...geometry.pose import Array
@@ -37,14 +36,15 @@ class Turning:
         """t of a force's direction [rad]."""
         return float(np.interp(angle, self.angles, self.tangents))
 
-    def angle(self, tangent: ArrayLike, near: float) -> Array:
+    def angle(self, tangent: float | Array, near: float) -> Array:
         """The force's direction [rad] of each t; where several have it (a foot stands still, or nearly so), the one
         nearest to another direction."""
         first, last = self._ends
-        low, high = np.interp(tangent, first, self.angles), np.interp(tangent, last, self.angles)
+        t = np.asarray(tangent, dtype=float)
+        low, high = np.interp(t, first, self.angles), np.interp(t, last, self.angles)
         return np.clip(near, low, high)
 
-    def drift(self, tangent: ArrayLike, near: float) -> Array:
+    def drift(self, tangent: float | Array, near: float) -> Array:
         """Of the foot, to its left, per way ahead, of each t; see angle."""
         return np.interp(self.angle(tangent, near), self.angles, self.drifts)
 
