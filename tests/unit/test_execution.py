@@ -342,6 +342,7 @@ def test_bags_hold_standard_messages(tmp_path):
     assert "/flatpush/object" not in found
 
 
+@pytest.mark.slow
 def test_a_controller_runs_on_a_robot(short_plan):
     law = PlanController.of(short_plan, "path", 50.0, stale=0.6, tolerance=(0.001, 0.01))
     unknown = Unknown(start=(0.002, -0.002, 0.03))

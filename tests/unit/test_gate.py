@@ -159,7 +159,13 @@ def test_a_failed_claim_says_where_by_how_much_and_what_is_allowed(documents):
     assert claim.rule == f"segment 0 (transit), sample {middle}: 50 mm, at most 0 mm"
 
 
-@pytest.mark.parametrize("start", [(0.01, -0.12, 3.4), (0.01, 0.12, -3.3), (-0.1, 0.02, 6.0)])
+@pytest.mark.parametrize(
+    "start",
+    [
+        (0.01, -0.12, 3.4),
+        *(pytest.param(s, marks=pytest.mark.slow) for s in ((0.01, 0.12, -3.3), (-0.1, 0.02, 6.0))),
+    ],
+)
 def test_yaw_goes_on_through_the_whole_plan(start):
     """Of 16 plans from beyond ±180°, 6 jumped by 2π between a transit and the next push."""
     thing = fp.Object(BLOCK, friction=0.4)

@@ -330,7 +330,8 @@ def test_no_test_waits_for_ever():
 SAYS = re.compile(
     r"\[[^\]]*\b(m|s|rad|deg|N|Hz|px)(?![a-z])[^\]]*\]|shape \(|\((n|m|k|\.\.\.|\d)[^)]*, ?[^)]*\)|X_[A-Z]{2}|0 to 1"
     r"|[Hh]ow many|\b(shares?|bytes|fraction|ratio|factor|coefficients?|number|degrees of freedom|relative|weights?)\b"
-    r"|\bunit (normal|vector|direction|twist|wrench)|radians|in the unit of"
+    r"|\bunit (normal|vector|direction|twist|wrench)|radians|in the unit of|without unit|in \[0, 1|\+1|within \(1 ±"
+    r"|: (see|as in) "
 )
 NUMERIC = re.compile(r"\b(float|int|Array|ArrayLike|NDArray|ndarray)\b")
 
@@ -364,14 +365,15 @@ def unsaid(module_name: str) -> Iterator[str]:
                 kin = [vars(c)[of.__name__] for c in inherited if of.__name__ in vars(c)]
                 doc = "\n".join(inspect.getdoc(one) or "" for one in (of, *kin))
                 hints = {k: str(v) for k, v in of.__annotations__.items() if NUMERIC.search(str(v))}
-                missing = [k for k in hints if k != "return" and not re.search(rf"\b{k}\b", doc)]
+                missing = [k for k in hints if k != "return" and not SAYS.search(entry(doc, k))]
                 if missing or (hints and not SAYS.search(doc)):
                     yield f"{full}({', '.join(missing)})"
 
 
 ROOMS = (
     *("geometry", "geometry.collision", "friction", "contact", "steering", "problem", "documents"),
-    *("simulation", "planning", "control", "execution", "vision"),
+    *("simulation", "simulation.plant", "planning", "planning.bound", "planning.sliding", "identification"),
+    *("control", "execution", "vision", "view", "gym"),
 )
 
 

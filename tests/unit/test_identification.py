@@ -138,7 +138,8 @@ def test_models_are_judged_as_they_deserve() -> None:
     judged = [judge(data, model, length=LENGTH, seeds=(0,)) for model in models]
     means = [j.mean for j in judged]
     assert means == sorted(means)
-    assert judged[0].mean_interval[0] < judged[0].mean < judged[0].mean_interval[1]
+    low, high = interval(judged[:1], np.mean)
+    assert low < judged[0].mean < high
     both = blended("mean", judged[1:3], data)
     assert both.mean <= max(means[1:3])
     np.testing.assert_allclose(np.linalg.norm(both.twists, axis=2), 1.0)

@@ -23,10 +23,10 @@ class Placement:
     """Fingertips at an outline, in the outline's frame O.
 
     Attributes:
-        points: of the outline that the tips touch, shape (k, 2).
+        points: of the outline that the tips touch, shape (k, 2) [m].
         normals: inward unit normals there, shape (k, 2).
-        tips: centres of the fingertips, shape (k, 2).
-        pose: X_OE, shape (3,): midway between the tips, +x the push direction.
+        tips: centres of the fingertips, shape (k, 2) [m].
+        pose: X_OE, shape (3,) [m, m, rad]: midway between the tips, +x the push direction.
     """
 
     points: Array

@@ -66,6 +66,10 @@ def steering_forces(contact: PointContact, surface: LimitSurface, margin: float)
 def kept_angle(friction: float, margin: float) -> float:
     """Half the opening angle of the friction cone that is left when a part of μ is kept in reserve [rad].
 
+    Args:
+        friction: the coefficient μ.
+        margin: the fraction of it that is kept in reserve.
+
     Raises:
         InputError: if the margin is not in [0, 1).
     """

@@ -29,7 +29,8 @@ def save_fitted_scene(
 
     Args:
         scene: the file that is changed. path: what is written.
-        support: on feet, in O [m]. friction: between fingertip and object. surface: about the centre of friction, SI.
+        support: on feet, in O [m]. friction: coefficient between fingertip and object.
+        surface: about the centre of friction, SI.
         note: comments at the top, lines.
 
     Raises:

@@ -156,7 +156,7 @@ def run(
         eyes: what sees the object; a simulated one is shown the robot's object. Frames whose pusher is not finite get
             the tool's pose from the robot's feedback at their exposure.
         log: a file ending in .csv (rows as of recorded runs) or .mcap.
-        speed: in parts of the plan's.
+        speed: a fraction of the plan's, above 0 and at most 1.
         clock: default: the robot's own, or the machine's.
         told: called after every cycle.
 

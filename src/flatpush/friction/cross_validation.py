@@ -125,16 +125,6 @@ class Judgement:
         """Median angle [rad]."""
         return float(np.median(self.angles))
 
-    @property
-    def mean_interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the mean [rad]: percentiles over resampled pairs."""
-        return interval([self], np.mean)
-
-    @property
-    def median_interval(self) -> tuple[float, float]:
-        """The same of the median [rad]."""
-        return interval([self], np.median)
-
 
 def judge(
     pairs: Pairs, model: AbstractModel, *, length: float, folds: int = 5, seeds: Sequence[int] = (0, 1)

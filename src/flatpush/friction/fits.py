@@ -46,9 +46,7 @@ def fit_ellipsoid(
         length: characteristic length [m]; default: the median over the pairs of √(|τ||v| / |f||ω|), for a
             round ellipsoid its √(a/b).
         force: the unit of force [N]; default: the root mean square of the normalised wrenches.
-        regularisation: λ.
-        force_weight: β.
-        velocity_weight: γ.
+        regularisation, force_weight, velocity_weight: the weights λ, β and γ, without unit.
 
     The defaults come from the 350 recorded force pushes of seven experiments (five folds, two seeds, mean
     and median angle of the twists left out): quartic 12.1° (8.1°) with β = 2, 10.7° (7.0°) with β = 0.2,
@@ -127,7 +125,7 @@ def fit_surface(
         kind: "ellipsoid" or "quartic".
         length: characteristic length [m]; default: the gyration radius of a support; of another surface, torque over
             force it resists.
-        regularisation: λ; the data have no noise.
+        regularisation: the weight λ, without unit; the data have no noise.
     """
     if kind not in ("ellipsoid", "quartic"):
         raise InputError('a surface is fitted by an "ellipsoid" or a "quartic"', value=kind)
@@ -164,7 +162,7 @@ def sized(surface: Ellipsoid | Quartic, wrenches: ArrayLike) -> Ellipsoid | Quar
     A fit pays for the norm of its coefficients, so that its surface comes out too large for the forces themselves.
 
     Args:
-        wrenches: measured ones, shape (n, 3).
+        wrenches: measured ones about the centre of friction, shape (n, 3) [N, N m].
     """
     middle = float(np.median(surface.value(wrenches)))
     if isinstance(surface, Ellipsoid):

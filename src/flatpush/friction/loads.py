@@ -58,7 +58,7 @@ def fit_loads(
             part of its own.
         nominal: shares of the parts that are expected without data, shape (parts,).
         trust: from 0 (the data alone) to 1 (the nominal shares alone): the result is the mean with these weights.
-        length: see fit_ellipsoid.
+        length: characteristic length [m]; default: as of fit_ellipsoid.
 
     Raises:
         InputError: if the pairs are too few or not finite, or nothing resists.

@@ -80,7 +80,7 @@ def exp(twist: ArrayLike) -> Array:
 
 
 def log(pose: ArrayLike) -> Array:
-    """The constant body twist whose exp is the pose; its turn is the pose's own angle, not wrapped.
+    """The constant body twist (..., 3) [m, rad] whose exp is the pose (..., 3); its turn is the angle, not wrapped.
 
     Raises:
         ValueError: if the angle is a whole number of turns other than zero and the position is not the origin

@@ -21,7 +21,6 @@ FPS = 10
 TASK = "push the object to the goal"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-SCALARS = ("timestamp", "next.reward")
 
 
 def load() -> tuple[ModuleType, ModuleType]:

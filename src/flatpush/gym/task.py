@@ -39,7 +39,7 @@ class Eyes:
 
     Attributes:
         position, angle: standard deviations of the pose that is seen [m, rad].
-        late: frames are so many steps old.
+        late: how many steps old frames are.
         dropped: the share of frames that do not come; the last one is seen again.
     """
 
@@ -72,8 +72,8 @@ class PushTask:
         coverage: the share of the goal's area that is enough.
         noise: what differs from the scene in each episode; None: nothing.
         eyes: how the object is seen.
-        rate: of decisions [Hz]. substeps: steps of the simulator in each.
-        longest: an episode is cut short after so many decisions.
+        rate: of decisions [Hz]. substeps: how many steps of the simulator each has.
+        longest: how many decisions after which an episode is cut short.
     """
 
     scene: Scene
@@ -177,7 +177,7 @@ class PushTask:
         raise InputError("there is no room for the finger", key="workspace", value=reach)
 
     def shape(self, pose: Array, wider: float = 0.0) -> "shapely.Polygon":
-        """The object at X_WO (3,), widened by a distance [m]."""
+        """The object at a pose X_WO (3,), wider all around by a distance [m]."""
         found = shapely.Polygon(transform(pose, self.scene.object.outline.polyline()))
         return found.buffer(wider) if wider else found
 
@@ -190,7 +190,7 @@ class PushTask:
         )
 
     def state(self, seen: Array, hand: Array, goal: Array) -> NDArray[np.float32]:
-        """What is observed of poses X_WO as seen, X_WE and the goal, each (..., 3): shape (..., 10 or 12)."""
+        """What is observed, (..., 10 or 12), of X_WO as seen, X_WE of the hand and X_WO of the goal, each (..., 3)."""
 
         def ends(X: Array) -> list[Array]:
             return [X[..., 0], X[..., 1], np.sin(X[..., 2]), np.cos(X[..., 2])]
@@ -201,19 +201,19 @@ class PushTask:
         )
 
     def error(self, pose: Array, goal: Array) -> Array:
-        """Distances [m] and angles [rad] of poses (..., 3) from goals, shape (..., 2)."""
+        """Distance [m] and angle [rad] of each pose from its goal, shape (..., 2); pose, goal: X_WO, shape (..., 3)."""
         off = pose[..., :2] - goal[..., :2]
         turn = np.abs(wrap_angle(pose[..., 2] - goal[..., 2]))
         return np.stack([np.hypot(off[..., 0], off[..., 1]), turn], axis=-1)
 
     def farthest(self, pose: Array, goal: Array) -> Array:
-        """How far the outline's farthest corner is from where it should be, shape (...) [m]."""
+        """How far the farthest corner is from its place at the goal, shape (...) [m]; pose, goal: X_WO, shape (..., 3)."""
         corners = self.scene.object.outline.polyline()
         away = transform(pose[..., None, :], corners) - transform(goal[..., None, :], corners)
         return np.max(np.linalg.norm(away, axis=-1), axis=-1)
 
     def solved(self, pose: Array, goal: Array) -> Array:
-        """Whether poses (..., 3) are at their goals, shape (...)."""
+        """Whether each pose is at its goal, shape (...); pose, goal: X_WO, shape (..., 3)."""
         if self.success == "coverage":
             flat = zip(pose.reshape(-1, 3), goal.reshape(-1, 3), strict=True)
             return np.reshape([self.covered(X, G) >= self.coverage for X, G in flat], pose.shape[:-1])
@@ -222,12 +222,16 @@ class PushTask:
         return np.all(off <= self.scene.planning.goal_tolerance, axis=-1)
 
     def covered(self, pose: Array, goal: Array) -> float:
-        """The share of the goal's area that the object covers."""
+        """The share of the goal's area that the object covers; pose, goal: X_WO, shape (3,)."""
         there = self.shape(goal)
         return float(there.intersection(self.shape(pose)).area / there.area)
 
     def moved(self, hand: Array, action: Array) -> Array:
-        """Poses of the hand in a decision, (..., substeps + 1, 3), from poses (..., 3) under actions in [-1, 1].
+        """Poses X_WE of the hand in a decision, shape (..., substeps + 1, 3).
+
+        Args:
+            hand: X_WE at its begin, shape (..., 3).
+            action: a fraction of the limits, -1 to 1, for each velocity.
 
         The hand goes straight and stays in its box; no fingertip is faster than the pusher's speed.
         """

@@ -40,11 +40,11 @@ class MotionFit:
 
     Attributes:
         thing: the object with the fitted support and friction.
-        pressure, numbers: the family and its free numbers (p,).
-        covariance: of the numbers and of log μ, (p + 1, p + 1).
-        scatter: of the ends of stretches, by what noise of the poses gives; about 1 where the model is right.
+        pressure: the family. numbers: its free numbers, shape (p,).
+        covariance: of the numbers and of log μ, shape (p + 1, p + 1).
+        scatter: of the ends of stretches, its ratio to what noise of the poses gives; about 1 where the model is right.
         stretches: how many were used. sliding: the share of their ways on which the finger slid.
-        evidence: -2 log of the data's probability under the family, up to a constant (Laplace).
+        evidence: the number -2 log of the data's probability under the family, up to a constant (Laplace).
         seen: what the recordings hold.
         others: fits of other families to the same motion, which explain it less well.
     """
@@ -61,14 +61,18 @@ class MotionFit:
     others: tuple["MotionFit", ...] = ()
 
     def at(self, change: Array) -> Object:
-        """The object with other numbers: a step (p + 1,) from the fitted ones."""
+        """The object with other numbers.
+
+        Args:
+            change: from the fitted ones, of the loads' p numbers and of the logarithm of the friction, shape (p + 1,).
+        """
         support = self.pressure.support(self.numbers + change[:-1])
         friction = float(self.thing.friction * np.exp(change[-1]))
         return Object(self.thing.outline, support, friction, None, self.thing.name)
 
     @property
     def friction_sd(self) -> float:
-        """Standard deviation of the friction."""
+        """Standard deviation of the friction coefficient."""
         return float(self.thing.friction * np.sqrt(self.covariance[-1, -1]))
 
 

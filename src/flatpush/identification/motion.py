@@ -90,6 +90,9 @@ class Seen:
 def look(motions: Sequence[Motion], outline: Outline, tip_radius: float) -> Seen:
     """Finds where the finger pushed, smooths it, and cuts it into stretches.
 
+    Args:
+        motions: the recordings. outline: of the object. tip_radius: of the finger [m].
+
     Raises:
         InputError: with recording and line: for an object that jumps, one that moves with no finger near it (the scene
             of another object, a wrong scale, a mirrored image), and where nothing moves at all.

@@ -42,8 +42,8 @@ def suggest(
     """The next pushes, one after the other the one that leaves least uncertain.
 
     Args:
-        places: whose turning radii matter.
-        length: of each push [m].
+        fit: what is known until now. places: whose turning radii matter.
+        tip_radius: of the finger [m]. count: how many pushes are suggested. length: of each [m].
     """
     thing = fit.thing
     values = np.array([turning_radius(thing, at) for at in places])

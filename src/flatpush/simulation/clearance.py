@@ -20,10 +20,10 @@ Places = NDArray[np.intp]
 def clearance_of(scene: Scene, segments: Sequence[Segment], need: float = -np.inf) -> float | None:
     """The least distance [m] of object and fingertips to obstacles and bounds over a whole plan; None without either.
 
-    A lower bound, at most 10 µm below the true value; the search ends early where less than `need` is found. Negative
-    where something overlaps or leaves the bounds. No motion between samples is missed: a piece in which nothing moves
-    further than m cannot come nearer than its ends' distances less m/2, and is halved until that settles it. A lifted
-    pusher is free of obstacles, not of bounds.
+    A lower bound, at most 10 µm below the true value; the search ends early where less than `need` [m] is found.
+    Negative where something overlaps or leaves the bounds. No motion between samples is missed: a piece in which
+    nothing moves further than m cannot come nearer than its ends' distances less m/2, and is halved until that settles
+    it. A lifted pusher is free of obstacles, not of bounds.
     """
     if scene.workspace.bounds is None and not scene.workspace.obstacles:
         return None

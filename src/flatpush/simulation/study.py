@@ -112,7 +112,7 @@ def study(
 
     Args:
         runs: how many, at least 1.
-        seed: run k draws from the stream (seed, k) alone.
+        seed: the number that all draws follow from; run k draws from the stream (seed, k) alone.
         noise: what is drawn; default: Noise().
         model, source: as of simulate.
         record: keep the whole way of the object.

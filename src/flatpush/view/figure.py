@@ -21,7 +21,7 @@ def save_figure(
         plan: solved or not; without a plan the figure shows start, goal and the reason.
         path: ends in .svg or .png (a picture), .gif (an animation) or .html (one to play with, in one file).
         rollouts: simulated runs of this plan, drawn over it in red dashes.
-        explored: paths of the search tree (Planner.explored), drawn faintly into a picture.
+        explored: Planner.explored, paths of the search tree, shape (m, samples, 2) [m], drawn faintly into a picture.
 
     Raises:
         InputError: if the ending is another, or the file cannot be written.

@@ -137,7 +137,7 @@ def calibrate(
     """The lens from all pictures, and the table from the one in which the target lies on it.
 
     Args:
-        pictures: names for messages, and grey pictures of one size. target: what is in them.
+        pictures: names for messages, and grey pictures of one size, (height, width) [px]. target: what is in them.
         table: index of the picture in which the target lies on the table. origin: pose of the target's frame in the
             table's, there, (3,) [m, m, rad].
 

@@ -149,7 +149,7 @@ def drive(
     Args:
         sensor: it is shown the plant at every tick.
         duration: at most so long [s]. begin: time of the first tick [s].
-        told: called at every tick with the time and the controller's state.
+        told: called at every tick with the time [s] and the controller's state.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError("a duration is positive and finite", key="duration", value=duration)

@@ -134,7 +134,7 @@ class Limits:
         """Straight to a stop and at rest there.
 
         Args:
-            stop: X_WE and height (x, y, θ, height), shape (4,); hand, height: where it is now.
+            stop: X_WE and height (x, y, θ, height), shape (4,); hand, height: where it is now, X_WE (3,) and [m].
             last, climb, dt: as in kept. table: whether this leg is made at the speed on the table.
         """
         delta = np.array([*(stop[:3] - hand), stop[3] - height])

@@ -71,8 +71,8 @@ def bounds(query: Query, cost: float, *, most: int = OPEN) -> Iterator[Bound]:
 
     Args:
         query: its cars have linear costs (no time laws); its world and `robust` are left out.
-        cost: of a known plan; plans that cost more are not looked at.
-        most: boxes that are kept open.
+        cost: of a known plan [m]; plans that cost more are not looked at.
+        most: how many boxes are kept open.
 
     Raises:
         InputError: for cars whose pieces take time, and for no room.

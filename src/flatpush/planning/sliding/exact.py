@@ -70,8 +70,8 @@ class SlidePlan:
         pushes: in their order.
         end: X_WO after the last, shape (3,).
         cost: length of the pushes, and the switch cost for each but the first [m].
-        growth: how far the end moves, at the outline's farthest point, when a push begins a metre further along the
-            outline, is longer by a metre, or turned by as much at the outline's reach: the most of them all.
+        growth: a factor: how far the end moves, at the outline's farthest point, when a push begins a metre further
+            along the outline, is longer by a metre, or turned by as much at the outline's reach: the most of them all.
     """
 
     status: str
@@ -154,7 +154,11 @@ class SlidePlanner:
     def plans(
         self, start: ArrayLike, goal: ArrayLike, tries: int = TRIES, tip: ArrayLike | None = None
     ) -> Iterator[SlidePlan]:
-        """Plans each cheaper than the one before; the same for the same arguments, which are those of plan."""
+        """Plans each cheaper than the one before; the same for the same arguments.
+
+        Args:
+            start, goal, tip, tries: as in plan.
+        """
         at = None if tip is None else np.array(tip, dtype=float)
         X_WO, goal_W = np.array(start, dtype=float), np.array(goal, dtype=float)
         slides = self.slides

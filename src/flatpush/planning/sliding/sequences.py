@@ -27,7 +27,7 @@ class Sequence:
     """Pushes of a library one after another.
 
     Attributes:
-        pushes: their numbers.
+        pushes: the number of each in the library.
         miss: how far the outline's farthest point ends from where it should be, about [m].
     """
 
@@ -59,7 +59,7 @@ class SlideSearch:
         self._pair_tree = cKDTree(library.coordinates(self._pairs), balanced_tree=False, compact_nodes=False)
 
     def sequences(self, goal: ArrayLike, within: float) -> Iterator[Sequence]:
-        """Sequences that end within a distance (see Sequence.miss) of a goal X_OG (3,), few pushes first.
+        """Sequences that end `within` a distance [m] (see Sequence.miss) of a goal X_OG (3,), few pushes first.
 
         Of each number of pushes the nearest are given, nearest first. Longer ones are sought only when the caller asks
         for more.

@@ -52,7 +52,7 @@ class SlideLibrary:
         return len(self.length)
 
     def steady(self, most: float) -> "SlideLibrary":
-        """The pushes of no more than so much growth."""
+        """The pushes whose growth is at most `most`, a factor."""
         kept = self.growth <= most
         rows = {f.name: getattr(self, f.name)[kept] for f in fields(self) if f.name not in ("cof", "reach")}
         return replace(self, **rows)

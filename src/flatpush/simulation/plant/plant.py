@@ -222,7 +222,7 @@ class Plant:
 
         Args:
             friction: of each run (n,). surfaces: of each, all of one kind and size. cofs: of each (n, 2).
-            threads: default: the machine's cores.
+            threads: how many; default: the machine's cores.
             push_out, body: as in follow. record: keeps the whole way of every run.
         """
         objects = np.array(starts, dtype=float)
