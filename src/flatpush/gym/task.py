@@ -207,7 +207,7 @@ class PushTask:
         return np.stack([np.hypot(off[..., 0], off[..., 1]), turn], axis=-1)
 
     def farthest(self, pose: Array, goal: Array) -> Array:
-        """How far the farthest corner is from its place at the goal, shape (...) [m]; pose, goal: X_WO, shape (..., 3)."""
+        """How far the farthest corner is from its place at the goal, (...) [m]; pose, goal: X_WO, shape (..., 3)."""
         corners = self.scene.object.outline.polyline()
         away = transform(pose[..., None, :], corners) - transform(goal[..., None, :], corners)
         return np.max(np.linalg.norm(away, axis=-1), axis=-1)
