@@ -119,7 +119,7 @@ def test_the_way_of_the_next_push_keeps_the_clearance_and_the_most_room():
         controller.observer.car(state, k, o.placement.tips[0])
         for k, o in enumerate(controller.planner.usable)
     ]
-    found = controller.surroundings.next_push(cars, np.array(scene.start), np.zeros(3), 0.03, 0)
+    *_, found = controller.surroundings.next_push(cars, np.array(scene.start), np.zeros(3), 0.03, 0)
     assert found.way.margin == MARGINS[0]
     place = controller.planner.usable[found.push].placement
     wall, corners = shapely.Polygon(WALL), scene.object.outline.vertices
@@ -129,7 +129,7 @@ def test_the_way_of_the_next_push_keeps_the_clearance_and_the_most_room():
     )
     assert shapely.distance(wall, shapely.points(tip)).min() - scene.pusher.tip_radius > 0.00299
     # Without the wall the way is another one, straight through where the wall stood.
-    open_ = HorizonController.of(among([])).surroundings.next_push(
+    *_, open_ = HorizonController.of(among([])).surroundings.next_push(
         cars, np.array(scene.start), np.zeros(3), 0.03, 0
     )
     assert shapely.distance(wall, shapely.polygons(transform(open_.way.poses[:, None], corners))).min() == 0
@@ -144,9 +144,11 @@ def test_less_room_is_kept_where_there_is_no_more():
     ]
     gap = 0.0271 - 0.0175
     for pose, margin in (((-0.2, gap - 0.0025, 0.0), 0.002), ((-0.2, gap - 0.0007, 0.0), 0.0005)):
-        found = controller.surroundings.next_push(cars, np.array(pose), np.zeros(3), 0.03, 0)
+        *_, found = controller.surroundings.next_push(cars, np.array(pose), np.zeros(3), 0.03, 0)
         assert found.way.margin == margin
-    why = controller.surroundings.next_push(cars, np.array((-0.2, gap - 0.0001, 0.0)), np.zeros(3), 0.03, 0)
+    *_, why = controller.surroundings.next_push(
+        cars, np.array((-0.2, gap - 0.0001, 0.0)), np.zeros(3), 0.03, 0
+    )
     assert "at the start" in why
 
 
@@ -166,14 +168,14 @@ def test_a_motion_is_free_as_shapely_says():
             shapely.distance(things, shapely.points(transform(way, tip))).min() - scene.pusher.tip_radius,
         )
         if abs(room - 0.001) > 2e-4 and shapely.distance(things, objects[0]) > 0.0012:
-            answers.append(around.free(tip, pose, twist, 0.001))
+            answers.append(around.free(tip[None], pose, twist, 0.001))
             assert answers[-1] == (room > 0.001)
     assert 0 < sum(answers) < len(answers)
     # Nearer than it should be already, it may go away but not nearer.
     near = np.array([-0.1 + 0.008 + 0.0175 + 0.0005, -0.03, np.pi / 2])
     tip = np.array([0.0, -0.02])
-    assert around.free(tip, near, np.array([0.0, -0.002, 0.0]), 0.001)
-    assert not around.free(tip, near, np.array([0.0, 0.0003, 0.0]), 0.001)
+    assert around.free(tip[None], near, np.array([0.0, -0.002, 0.0]), 0.001)
+    assert not around.free(tip[None], near, np.array([0.0, 0.0003, 0.0]), 0.001)
 
 
 def test_a_finger_leaves_as_far_as_is_free():

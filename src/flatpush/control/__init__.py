@@ -17,6 +17,7 @@ from .loop.measurement import Command, Measurement
 from .loop.sensor import AbstractSensor, Camera, SensorState, SimulatedSensor
 from .tracking.learning_controller import LearningController
 from .tracking.plan_controller import PlanController
+from .tracking.replanning_controller import ReplanningController
 
 __all__ = [
     "ARRIVED",
@@ -36,6 +37,7 @@ __all__ = [
     "PathReference",
     "PlanController",
     "PostureController",
+    "ReplanningController",
     "SensorState",
     "SimulatedSensor",
     "SteeringBelief",

@@ -15,12 +15,13 @@ from ..control import ControllerState, SimulatedSensor
 from ..control.horizon.controller import HorizonController
 from ..control.loop.closed_loop import ClosedLoopRun, drive
 from ..control.loop.sensor import Camera
+from ..control.tracking.replanning_controller import ReplanningController
 from ..control.tracking.touched import touched
 from ..errors import FlatpushError
 from ..geometry import Outline, compose, pose_error, transform
 from ..geometry.pose import Array
 from ..planning import Planner
-from ..problem import Scene, Workspace
+from ..problem import Planning, Pusher, Scene, Workspace
 from ..simulation.plant import Plant
 from .feedback import WITHIN, Task, task
 
@@ -30,6 +31,8 @@ SIZES = 0.01, 0.035  # radii of obstacles [m]
 ROUND = 0.3  # the part of them that are circles
 BESIDE = 0.012  # between an obstacle and the object at the start and at the goal [m]
 CLEARANCE = 0.003  # of the way that there is [m]
+SPACING = 0.015  # of two fingers [m]
+CARRIED = 0.001, float(np.deg2rad(1.0))  # the goal of two fingers
 PATIENCE = 400.0  # [s]
 DRAWS = 40
 
@@ -37,7 +40,7 @@ DRAWS = 40
 @dataclass(frozen=True, eq=False)
 class EndedAmong:
     """How a run ended: distance [m] and angle [rad] off the goal, what the controller said, what was touched ("" if
-    nothing was), landings and seconds."""
+    nothing was), landings, seconds, and within what distance and angle it should end."""
 
     distance: float
     angle: float
@@ -45,19 +48,31 @@ class EndedAmong:
     touched: str
     landings: int
     time: float
+    within: tuple[float, float]
 
     @property
     def good(self) -> bool:
-        return self.distance <= WITHIN[0] and self.angle <= WITHIN[1] and not self.touched
+        return self.distance <= self.within[0] and self.angle <= self.within[1] and not self.touched
 
 
-def crowded_task(number: int, seed: int = 0) -> Task:
+def carried_task(number: int, seed: int = 0) -> Task:
+    """The task of a number with two fingers, and with the reserve that they have by default."""
+    plain = task(number, seed)
+    pusher = Pusher(fingers=2, spacing=SPACING)
+    assert not isinstance(plain.scene.pushes, str)
+    pushes = tuple(replace(push, fingers=2, spacing=SPACING) for push in plain.scene.pushes)
+    return replace(
+        plain, scene=replace(plain.scene, pusher=pusher, pushes=pushes, planning=Planning(iterations=1))
+    )
+
+
+def crowded_task(number: int, seed: int = 0, fingers: int = 1) -> Task:
     """The task of a number, with things in its way.
 
     Raises:
         ValueError: if no way was found in any draw.
     """
-    plain = task(number, seed)
+    plain = task(number, seed) if fingers == 1 else carried_task(number, seed)
     rng = np.random.default_rng([seed, number, 2])
     for _ in range(DRAWS):
         scene = replace(plain.scene, workspace=_things(plain.scene, rng))
@@ -102,15 +117,16 @@ def _things(scene: Scene, rng: np.random.Generator) -> Workspace:
 
 
 def attempt_among(
-    given: Task, law: type[HorizonController] = HorizonController
+    given: Task, law: type[HorizonController] | type[ReplanningController] = HorizonController
 ) -> tuple[EndedAmong, ClosedLoopRun | None]:
-    """Runs one task with a horizon controller; without a run if the controller refuses it."""
+    """Runs one task with a controller that lands again; without a run if the controller refuses it."""
     scene = given.scene
     try:
         controller = law.of(scene)
     except FlatpushError as error:
-        return EndedAmong(np.inf, np.inf, f"refused: {error}", "", 0, 0.0), None
-    plant = Plant(given.truth, [[0.0, 0.0]], scene.pusher.tip_radius)
+        return EndedAmong(np.inf, np.inf, f"refused: {error}", "", 0, 0.0, WITHIN), None
+    tips = controller.limits.tips
+    plant = Plant(given.truth, tips, scene.pusher.tip_radius)
     option = controller.planner.usable[0]
     assert option.placement is not None
     hand = compose(scene.start_pose, compose(option.placement.pose, [-scene.pusher.approach, 0.0, 0.0]))
@@ -122,10 +138,17 @@ def attempt_among(
 
     sensor = SimulatedSensor(Camera(), np.random.default_rng(given.seed))
     run = drive(controller, plant, scene.start_pose, hand, sensor, PATIENCE, told=tick)
+    within = WITHIN if len(tips) == 1 else CARRIED
     off = pose_error(run.object[-1], scene.goal)
-    hit = touched(scene, np.zeros((1, 2)), run)
+    hit = touched(scene, tips, run)
     ended = EndedAmong(
-        float(np.hypot(*off[:2])), abs(float(off[2])), run.outcome, hit, landings, float(run.times[-1])
+        float(np.hypot(*off[:2])),
+        abs(float(off[2])),
+        run.outcome,
+        hit,
+        landings,
+        float(run.times[-1]),
+        within,
     )
     return ended, run
 

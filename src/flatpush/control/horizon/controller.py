@@ -25,7 +25,7 @@ from .contact_observer import LOST, ContactObserver, nearest_contact
 from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
 from .state import HorizonState, LearningWindow
-from .surroundings import GUARD, Surroundings
+from .surroundings import GUARD, Surroundings, Thoughts
 from .way import Way
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
@@ -154,7 +154,7 @@ class HorizonController(AbstractController[HorizonState]):
             raise InputError(
                 "the horizon controller steers with one finger",
                 value=scene.pusher.fingers,
-                hint="Two fingers do not need it: follow the plan with the path controller.",
+                hint="ReplanningController is that of two.",
             )
         planning = replace(
             scene.planning, friction_margin=max(RESERVE, scene.planning.friction_margin), iterations=1
@@ -205,6 +205,8 @@ class HorizonController(AbstractController[HorizonState]):
         return act(state, time)
 
     def _look(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
+        if state.thoughts is not None:
+            return self._think(state, state.thoughts, time)
         state = replace(state, mode="look", note="")
         if len(state.frames) < FRAMES:
             return state, self._standing(state)
@@ -238,7 +240,10 @@ class HorizonController(AbstractController[HorizonState]):
             cars = self._usable(state)
         cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         if self.surroundings is not None:
-            return self._land_among(state, self.surroundings, cars, pose, text, time)
+            seed = state.landings + LOOKS * state.stuck
+            ways = self.surroundings.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
+            thoughts = Thoughts(ways)
+            return self._think(replace(state, thoughts=thoughts, thought=0, note=text), thoughts, time)
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
             why = "no push can be steered"
@@ -258,18 +263,17 @@ class HorizonController(AbstractController[HorizonState]):
         stops[:, 2] = hand[2] + pose_error(stops[:, :3], hand)[:, 2]
         return self._land(state, found, cars[found.push], pose, stops, text, time)
 
-    def _land_among(
-        self,
-        state: HorizonState,
-        around: Surroundings,
-        cars: list[ContactCar | None],
-        pose: Array,
-        text: str,
-        time: float,
+    def _think(
+        self, state: HorizonState, thoughts: Thoughts[Landing | str], time: float
     ) -> tuple[HorizonState, Command]:
-        """Up, over and down to the next push among things; looks again, a few times, where there is none."""
-        seed = state.landings + LOOKS * state.stuck
-        found = around.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
+        """A tick's part of the search for a way among things; then up, over and down to the push that was found.
+
+        It looks again, a few times, where there is none.
+        """
+        found, text = thoughts.part(state.thought), state.note
+        if found is None:
+            return replace(state, thought=state.thought + 1), self._standing(state)
+        state = replace(state, thoughts=None)
         if isinstance(found, str):
             if state.stuck + 1 >= LOOKS:
                 return replace(state, mode="done", outcome=f"stopped, {text}: {found}"), self._standing(state)
@@ -277,7 +281,8 @@ class HorizonController(AbstractController[HorizonState]):
             return again, self._standing(state)
         place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
-        pusher = self.scene.pusher
+        assert found.way is not None
+        pusher, pose = self.scene.pusher, found.way.poses[0]
         contact = compose(pose, place.pose)
         contact[2] = hand[2] + pose_error(contact, hand)[2]
         before = compose(pose, compose(place.pose, [-pusher.approach, 0.0, 0.0]))
@@ -289,7 +294,7 @@ class HorizonController(AbstractController[HorizonState]):
                 [*contact, 0],
             ]
         )
-        return self._land(state, found, cars[found.push], pose, stops, text, time)
+        return self._land(state, found, self._usable(state)[found.push], pose, stops, text, time)
 
     def _land(
         self,
@@ -485,7 +490,7 @@ class HorizonController(AbstractController[HorizonState]):
         assert self.surroundings is not None
         rests = 1 / self.rate + 0.5 * speed / (BRAKE * self.scene.pusher.acceleration)
         twist = rests * state.car.model.twist(speed, omega)
-        return self.surroundings.free(state.tip, pose, twist, GUARD * way.margin)
+        return self.surroundings.free(state.tip[None], pose, twist, GUARD * way.margin)
 
     def _driven(self, state: HorizonState, turn: float, time: float) -> float:
         """How far the flat point has come in the last tick [m]."""

@@ -1,7 +1,7 @@
 """What the horizon controller remembers from tick to tick."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from ..loop.measurement import Measurement
 from .contact_car import ContactCar
 from .push_knowledge import Steering
 from .way import Way
+
+if TYPE_CHECKING:
+    from .landings import Landing
+    from .surroundings import Thoughts
 
 Phase = Literal["look", "transit", "push", "resume", "retreat"]
 
@@ -51,6 +55,7 @@ class HorizonState(ControllerState):
         car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
             allowed: it ends after this at the latest [m].
         way, passed: of the push among things, and the number of its pose that was passed.
+        thoughts, thought: of where to land next among things, and how many parts of that are done.
         stuck: how often no way was found since the last.
         landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
             object or the finger would have left the bounds.
@@ -75,6 +80,8 @@ class HorizonState(ControllerState):
     allowed: float = np.inf
     way: Way | None = None
     passed: int = 0
+    thoughts: "Thoughts[Landing | str] | None" = None
+    thought: int = 0
     stuck: int = 0
     landings: int = 0
     resumes: int = 0

@@ -1,9 +1,10 @@
 """What object and finger keep clear of: ways for the next push among it, and whether a motion is free."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ...planning.options import PushOption
 from ...planning.path import Path
 from ...planning.query import Query
 from ...problem import Scene
+from ...steering.fleet import Fleet
 from .contact_car import ContactCar
 from .landings import Landing, fleet_of_contacts, free_path
 from .way import Way
@@ -28,6 +30,33 @@ GUARD = 0.4
 ROUNDS, BETTER = 40, 6
 # Back from the object the finger goes by the first of these shares of the approach that is free.
 BACK = (1.0, 0.5, 0.25)
+
+
+class RoomyPath(NamedTuple):
+    """A path, and what it keeps beyond the scene's clearance [m]."""
+
+    path: Path
+    margin: float
+
+
+FoundT = TypeVar("FoundT")
+
+
+class Thoughts(Generic[FoundT]):
+    """Work in parts, for a tick each: the same parts whenever they are asked for, done when first asked for.
+
+    Args:
+        parts: None for each part, and then what was found.
+    """
+
+    def __init__(self, parts: Iterator[FoundT | None]) -> None:
+        self._parts, self._done = parts, list[FoundT | None]()
+
+    def part(self, number: int) -> FoundT | None:
+        """What was found after so many parts, counted from 0; None as long as nothing is."""
+        while len(self._done) <= number:
+            self._done.append(next(self._parts))
+        return self._done[number]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +81,36 @@ class Surroundings:
 
     def next_push(
         self, cars: Sequence[ContactCar | None], pose: Array, goal: Array, switching: float, seed: int
-    ) -> Landing | str:
-        """Where to land next with an object at X_WO, with the way of that push; or why there is none.
-
-        Of the ways with the most room to spare the cheapest that was found.
+    ) -> Iterator[Landing | str | None]:
+        """Where one finger lands next with an object at X_WO, and the way of that push; or why there is none.
 
         Args:
             cars: of the options; None where one is left out. goal: X_WO. switching, seed: see landings.next_push.
+
+        Returns:
+            what is found comes last, after None for every part of the work.
         """
         known = [(k, car) for k, car in enumerate(cars) if car is not None]
         if not known:
-            return "no push can be steered"
-        pusher = self.scene.pusher
-        options = [self.options[k] for k, _ in known]
+            yield "no push can be steered"
+            return
         fleet = fleet_of_contacts([car for _, car in known], switching)
+        for found in self.ways(fleet, [self.options[k] for k, _ in known], pose, goal, seed):
+            if isinstance(found, RoomyPath):
+                way = Way.of(found.path, found.margin)
+                yield Landing(known[found.path.pushes[0]][0], way.poses[-1], float(way.left[0]), way)
+            else:
+                yield found
+
+    def ways(
+        self, fleet: Fleet, options: Sequence[PushOption], pose: Array, goal: Array, seed: int
+    ) -> Iterator[RoomyPath | str | None]:
+        """Of the paths from X_WO with the most room to spare the cheapest that is found, as next_push.
+
+        Args:
+            fleet: the cars of options. goal: X_WO.
+        """
+        pusher = self.scene.pusher
         places = [option.placement for option in options if option.placement is not None]
         query = Query(
             fleet,
@@ -82,51 +127,54 @@ class Surroundings:
             if not asked.first or not asked.last:
                 complaint = obstructions(self.scene, asked, options)
                 continue
+            if direct is None:
+                direct = free_path(asked, seed)
+                yield None
             search = Search(asked, seed)
-            direct = direct or free_path(asked, seed)
             if not search.offer(direct):
-                self._searched(search)
+                found = 0
+                for path in islice(search.rounds(), ROUNDS):
+                    yield None
+                    found += path is not None
+                    if found > BETTER:
+                        break
             if search.best is not None:
-                way = Way.of(search.best, margin)
-                push = known[search.best.pushes[0]][0]
-                return Landing(push, way.poses[-1], float(way.left[0]), way)
+                yield RoomyPath(search.best, margin)
+                return
             complaint = f"no way with {1000 * asked.clearance:.2f} mm of clearance was found from here"
-        return complaint
+        yield complaint
 
-    @staticmethod
-    def _searched(search: Search) -> None:
-        """Goes on for some rounds, and for a few after the first way."""
-        since = 0
-        for path in islice(search.rounds(), ROUNDS):
-            since += path is not None
-            if since > BETTER:
-                break
-
-    def free(self, tip: Array, pose: Array, twist: Array, margin: float) -> bool:
-        """Whether object and finger keep the clearance and a margin [m], or do not come nearer than they are, along a
+    def free(self, tips: Array, pose: Array, twist: Array, margin: float) -> bool:
+        """Whether object and fingers keep the clearance and a margin [m], or do not come nearer than they are, along a
         constant twist.
 
         Args:
-            tip: centre of the finger in O, shape (2,). pose: X_WO. twist: in O, over the whole motion, shape (3,).
+            tips: centres of the fingers in O, shape (k, 2). pose: X_WO. twist: in O, over the whole motion, shape (3,).
         """
         from ...geometry.collision.kernels import pose_gap, twist_gap
 
         need = self.scene.clearance + margin
-        body = Body.of(self.scene.object.outline, tip[None], self.scene.pusher.tip_radius).arrays
+        body = Body.of(self.scene.object.outline, tips, self.scene.pusher.tip_radius).arrays
         world = self._arrays[0]
         if twist_gap(world, body, pose, twist, need, need) >= need:
             return True
         now = pose_gap(world, body, pose, need, -np.inf)
         return bool(now < need and twist_gap(world, body, pose, twist, need, -np.inf) >= now - 1e-6)
 
-    def back(self, hand: Array, angle: float) -> Array:
-        """Where a finger at X_WE goes that leaves the object, against the direction of an angle [rad]: shape (3,)."""
+    def back(self, hand: Array, angle: float, tips: Array | None = None) -> Array:
+        """Where a hand at X_WE goes that leaves the object, against the direction of an angle [rad]: shape (3,).
+
+        Args:
+            tips: centres of the fingers in E, shape (k, 2); default: one at its origin.
+        """
         from ...geometry.collision.kernels import twist_gap
 
         world, finger = self._arrays
-        at, need = np.array([hand[0], hand[1], 0.0]), self.scene.clearance
+        places = transform(hand, np.zeros((1, 2)) if tips is None else tips)
+        need = self.scene.clearance
         for share in BACK:
-            step = rotate(angle, np.array([-share * self.scene.pusher.approach, 0.0]))
-            if twist_gap(world, finger.arrays, at, np.array([*step, 0.0]), need, need) >= need:
-                return hand + np.array([*step, 0.0])
+            step = np.array([*rotate(angle, np.array([-share * self.scene.pusher.approach, 0.0])), 0.0])
+            starts = [np.array([*place, 0.0]) for place in places]
+            if all(twist_gap(world, finger.arrays, at, step, need, need) >= need for at in starts):
+                return hand + step
         return hand

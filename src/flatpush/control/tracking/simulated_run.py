@@ -18,6 +18,7 @@ from ..loop.closed_loop import ClosedLoopRun, drive
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.sensor import Camera, SimulatedSensor
 from .plan_controller import BESIDE, PlanController, beside, check_pushes, goal_error
+from .replanning_controller import ReplanningController
 from .slides import slide_by_slide
 from .touched import touched
 
@@ -114,8 +115,20 @@ class TrackedRun:
         goal = plan.scene.planning.goal_tolerance
         return self.tolerance or (float(min(goal[:2])), float(goal[2]))
 
+    @property
+    def _sd(self) -> tuple[float, float]:
+        return max(self.camera.position, 1e-5), max(self.camera.angle, 1e-4)
+
     def law(self, plan: Plan) -> AbstractController:
         """The controller alone."""
+        if self.controller == "horizon" and plan.scene.pusher.fingers == 2:
+            return ReplanningController.of(
+                plan,
+                self.rate,
+                self.camera.latency,
+                tolerance=self._within(plan),
+                sd=self._sd,
+            )
         if self.controller == "horizon":
             return HorizonController.of(
                 plan,
@@ -131,7 +144,7 @@ class TrackedRun:
             gains=Gains.of(self.frequency, self.damping),
             timing=self.timing,
             learn=self.learn,
-            sd=(max(self.camera.position, 1e-5), max(self.camera.angle, 1e-4)),
+            sd=self._sd,
             stale=0.5 + self.camera.latency,
             tolerance=self._within(plan),
         )
