@@ -7,11 +7,12 @@ tick, to a tenth of a millimetre.
 """
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import shapely
 
-from ..control import ControllerState, SimulatedSensor
+from ..control import AbstractController, ControllerState, SimulatedSensor
 from ..control.horizon.controller import HorizonController
 from ..control.loop.closed_loop import ClosedLoopRun, drive
 from ..control.loop.sensor import Camera
@@ -137,7 +138,8 @@ def attempt_among(
         landings = max(landings, getattr(state, "landings", 0))
 
     sensor = SimulatedSensor(Camera(), np.random.default_rng(given.seed))
-    run = drive(controller, plant, scene.start_pose, hand, sensor, PATIENCE, told=tick)
+    law_ = cast("AbstractController[ControllerState]", controller)
+    run = drive(law_, plant, scene.start_pose, hand, sensor, PATIENCE, told=tick)
     within = WITHIN if len(tips) == 1 else CARRIED
     off = pose_error(run.object[-1], scene.goal)
     hit = touched(scene, tips, run)

@@ -242,7 +242,7 @@ class HorizonController(AbstractController[HorizonState]):
         if self.surroundings is not None:
             seed = state.landings + LOOKS * state.stuck
             ways = self.surroundings.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
-            thoughts = Thoughts(ways)
+            thoughts: Thoughts[Landing | str] = Thoughts(ways)
             return self._think(replace(state, thoughts=thoughts, thought=0, note=text), thoughts, time)
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:

@@ -177,7 +177,7 @@ class ReplanningController(AbstractController[ReplanningState]):
         if state.landings >= self.landings:
             why = ARRIVED if inside <= 1 else f"still {text} after {state.landings} landings"
             return replace(state, mode="done", note=text, outcome=why), self._standing(state)
-        thoughts = Thoughts(self._ways(pose, state.landings + LOOKS * state.stuck))
+        thoughts: Thoughts[RoomyPath | str] = Thoughts(self._ways(pose, state.landings + LOOKS * state.stuck))
         return self._think(replace(state, thoughts=thoughts, thought=0, note=text), thoughts, time)
 
     def _ways(self, pose: Array, seed: int) -> Iterator[RoomyPath | str | None]:
