@@ -67,6 +67,8 @@ def test_a_plan_is_run_reported_logged_and_drawn(files, tmp_path, capsys):
         (("--robot", "sim", "--controller", "pid"), "path, dfl, horizon"),
         (("--robot", "dry-run", "--controller", "path"), "does not see the object"),
         (("--robot", "sim", "--controller", "path", "--latency", "-1"), "--latency is a finite number"),
+        (("--robot", "sim", "--film", "cell.gif"), "--film and --window show the physics cell"),
+        (("--robot", "mujoco://tool", "--film", "cell.mp4"), "ends in .gif or .html"),
         (("--robot", "sim", "--base-frame", "1,2"), "--base-frame takes 4 numbers"),
     ],
 )

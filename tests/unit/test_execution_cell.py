@@ -2,6 +2,7 @@
 
 import math
 import sys
+import types
 from ctypes.util import find_library
 
 import numpy as np
@@ -12,8 +13,9 @@ from tests.extras import extra
 
 import flatpush as fp
 from flatpush.execution import DONE, open_robot, run
+from flatpush.execution.cell.film import film, window
 from flatpush.execution.cell.model import MASS, Physics, cell_xml, convex_pieces
-from flatpush.execution.cell.robot import CellRobot, load
+from flatpush.execution.cell.robot import DISPLAYS, CellRobot, load
 from flatpush.execution.simulated import Unknown
 from flatpush.geometry import pose_error
 from flatpush.testing import check_robot
@@ -122,6 +124,70 @@ def test_pictures_need_no_display(short_plan, tmp_path):
     drawn = np.asarray(Image.open(path).convert("RGB")).astype(int)
     blue = (drawn[..., 2] > drawn[..., 0] + 60).mean()
     assert 0.002 < blue < 0.2
+
+
+@pytest.mark.slow
+def test_a_run_is_filmed_also_if_it_is_broken_off(short_plan, tmp_path):
+    from PIL import Image
+
+    if find_library("EGL") is None:
+        pytest.skip("there is no libEGL to draw with: install libegl1")
+
+    def ended(cycle):
+        told(cycle)
+        if cycle.time > 1.5:
+            raise KeyboardInterrupt
+
+    path, page = tmp_path / "cell.gif", tmp_path / "cell.html"
+    with CellRobot(short_plan) as robot, pytest.raises(KeyboardInterrupt), film(robot, path) as told:
+        run(short_plan, robot, told=ended)
+    with Image.open(path) as shown:
+        assert shown.n_frames == 7  # one every 0.24 s from 0 on
+        assert shown.info["duration"] == 80
+        first = np.asarray(shown.convert("RGB")).astype(int)
+        shown.seek(6)
+        last = np.asarray(shown.convert("RGB")).astype(int)
+    assert first.shape == (480, 640, 3)
+    assert (np.abs(last - first).max(axis=2) > 30).mean() > 0.002  # the tool is elsewhere
+    with CellRobot(short_plan) as robot, film(robot, page) as told:
+        run(short_plan, robot, told=lambda cycle: told(cycle) if cycle.time < 0.1 else None)
+    assert 'src="data:image/gif;base64,R0lGOD' in page.read_text()
+    with CellRobot(short_plan) as robot, pytest.raises(fp.InputError, match=r"\.gif or \.html"):
+        film(robot, tmp_path / "cell.mp4").__enter__()
+
+
+def test_a_window_shows_the_cell_and_where_there_is_no_display_says_so(short_plan, monkeypatch):
+    """The window itself is MuJoCo's; here it only counts."""
+    shown = []
+
+    class Passive:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            shown.append("closed")
+
+        def sync(self):
+            shown.append(None)
+
+    viewer = types.ModuleType("mujoco.viewer")
+    viewer.launch_passive = lambda model, data: Passive()
+    monkeypatch.setitem(sys.modules, "mujoco.viewer", viewer)
+    monkeypatch.setattr("mujoco.viewer", viewer, raising=False)
+    monkeypatch.setattr("flatpush.execution.cell.film.time.sleep", lambda seconds: None)
+    with CellRobot(short_plan) as robot:
+        for name in DISPLAYS:
+            monkeypatch.delenv(name, raising=False)
+        if sys.platform == "linux":
+            with pytest.raises(fp.InputError, match="no display"):
+                window(robot).__enter__()
+        monkeypatch.setenv("DISPLAY", ":0")
+        with window(robot) as told:
+            ended = run(short_plan, robot, told=told)
+    assert ended.outcome == DONE
+    assert shown[-1] == "closed"
+    # No cycle of 4 ms falls on a thirtieth of a second: a picture comes in every ninth.
+    assert len(shown) - 1 == math.ceil(len(ended.cycles) / 9)
 
 
 def test_without_mujoco_one_line_says_so(short_plan, monkeypatch):

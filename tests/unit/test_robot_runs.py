@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush.execution.cell.robot import CellRobot
 from flatpush.experiments import experiment, robot_runs
 from flatpush.experiments.robot_runs import (
     GOAL,
@@ -13,14 +14,17 @@ from flatpush.experiments.robot_runs import (
     PRINTED,
     STARTS,
     Case,
+    beside,
     cases,
     draw,
     expected,
+    fed_back,
     half_widths,
     pairs,
     plans,
     recorded,
     table,
+    table_of_one,
 )
 from flatpush.geometry import pose_error
 
@@ -100,6 +104,24 @@ def test_a_case_ends_at_the_goal_and_is_drawn(tmp_path):
     assert not np.allclose(case.starts[0], case.starts[1])
     draw("fig7", [case], tmp_path / "fig7.svg")
     assert "start 20, -30, 90" in (tmp_path / "fig7.svg").read_text()
+
+
+@pytest.mark.slow
+def test_one_finger_under_feedback_comes_to_the_goal_from_the_same_starts():
+    (errors, times) = next(fed_back("fig7", runs=1))
+    assert np.hypot(*errors[0, :2]) < 0.001
+    assert abs(errors[0, 2]) < np.radians(1)
+    assert times[0] > 10
+    with CellRobot(pairs("fig7", STARTS["fig7"][0])[0][0], beside("fig7", 0, 0, 0)) as robot:
+        off = robot.object - [0.02, -0.03, np.pi / 2]
+    assert 1e-5 < np.hypot(*off[:2]) < 0.004
+
+
+def test_runs_near_the_goal_are_counted():
+    errors = np.array([[0.0005, 0.0, 0.01], [0.0, 0.0011, 0.0], [0.0, 0.0, -0.02]])
+    text = table_of_one("fig7", [(errors, np.array([10.0, 20.0, 30.0]))])
+    assert "0.53 mm    0.57°, at worst 1.10 mm 1.15°, 20 s" in text
+    assert text.endswith("1 of 3 within 1 mm and 1°")
 
 
 def test_the_figures_are_experiments():

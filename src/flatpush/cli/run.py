@@ -6,7 +6,7 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
@@ -73,6 +73,11 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Draw what was planned against what was done as .svg or .png."),
     ] = None,
+    film: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Film the physics cell as .gif, or on a page as .html."),
+    ] = None,
+    window: Annotated[bool, typer.Option("--window", help="Show the physics cell in a window.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C and SIGTERM stop the robot."""
@@ -93,11 +98,19 @@ def command(
         raise InputError("--camera, --tag and --controller go together")
     frame = numbers(base_frame, 4, "--base-frame")
     trusted = () if scene is None else scene_files(scene)
-    check_outputs([plan, *trusted], [log, figure])
+    check_outputs([plan, *trusted], [log, figure, film])
+    if (film is not None or window) and not robot.startswith("mujoco"):
+        raise InputError(
+            "--film and --window show the physics cell", value=robot, hint="mujoco://tool, for one."
+        )
     loaded = load_plan(plan)
-    check_outputs(plan_files(plan, loaded.run), [log, figure])
+    check_outputs(plan_files(plan, loaded.run), [log, figure, film])
     if log is not None:
         check_log(log)
+    if film is not None:
+        from ..execution.cell.film import check_film
+
+        check_film(film)
     if figure is not None:
         from ..view.picture import check_ending
 
@@ -124,7 +137,8 @@ def command(
             if controller is None
             else _closed(loaded, arm, cast("Law", controller), speed, seed, look, latency)
         )
-        ended = run(loaded, arm, law, eyes, log, speed=speed, told=_progress(loaded.duration / speed))
+        told = [_progress(loaded.duration / speed), *_shown(stack, arm, film, window)]
+        ended = run(loaded, arm, law, eyes, log, speed=speed, told=lambda cycle: _tell_all(told, cycle))
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     result = _result(ended, controller)
@@ -140,7 +154,7 @@ def command(
     if as_json:
         print_json(result)
     else:
-        _tell(result, log)
+        _tell(result, log, film)
     return 0 if good else 3
 
 
@@ -243,10 +257,30 @@ def _ask(yes: bool, robot: str) -> None:
         time.sleep(1.0)
 
 
-def _progress(planned: float) -> Callable[[Cycle], None] | None:
+def _shown(stack: ExitStack, arm: Robot, film: Path | None, window: bool) -> list[Callable[[Cycle], None]]:
+    """What is to be told each cycle to film the physics cell and to show it."""
+    found = []
+    if film is not None or window:
+        from ..execution.cell import film as films
+        from ..execution.cell.robot import CellRobot
+
+        cell = cast("CellRobot", arm)
+        if film is not None:
+            found.append(stack.enter_context(films.film(cell, film)))
+        if window:
+            found.append(stack.enter_context(films.window(cell)))
+    return found
+
+
+def _tell_all(told: Sequence[Callable[[Cycle], None]], cycle: Cycle) -> None:
+    for one in told:
+        one(cycle)
+
+
+def _progress(planned: float) -> Callable[[Cycle], None]:
     """Writes where it is, and how far the tool is from where it should be, four times a second."""
     if not sys.stderr.isatty():
-        return None
+        return lambda cycle: None
     last = -math.inf
 
     def told(cycle: Cycle) -> None:
@@ -272,7 +306,7 @@ def _result(run: Run, controller: str | None) -> dict[str, Any]:
     }
 
 
-def _tell(result: dict[str, Any], log: Path | None) -> None:
+def _tell(result: dict[str, Any], log: Path | None, film: Path | None) -> None:
     typer.echo(
         f"{result['outcome']} after {result['time']:.2f} s, {result['cycles']} cycles; the tool was at most"
         f" {1000 * result['tool_off']:.2f} mm from where it was sent"
@@ -280,5 +314,5 @@ def _tell(result: dict[str, Any], log: Path | None) -> None:
     if "final_pose" in result:
         off = error_text(result["distance"], result["turn"])
         typer.echo(f"the object is at {pose_text(result['final_pose'])}, off the goal by {off}")
-    for name in filter(None, (log, result.get("figure"))):
+    for name in filter(None, (log, film, result.get("figure"))):
         typer.echo(f"wrote {name}")

@@ -2,12 +2,15 @@
 
 import math
 import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, MissingExtra
 from ...geometry.pose import Array
@@ -24,6 +27,9 @@ OBJECT, TOOL = slice(0, 3), slice(-4, None)
 # The drives are led by this much of the speed, so that their damping does not hold the tool back [s].
 LEAD = DAMPING / STIFFNESS
 PICTURE = (960, 1280)
+Picture = NDArray[np.uint8]
+# Where Linux says that there is a display.
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 # The arms that it has.
 HELD_BY = ("irb120", "fr3")
 
@@ -124,12 +130,36 @@ class CellRobot(DryRun):
         """Draws the cell as it is now, as a .png."""
         from PIL import Image
 
+        with self.pictures(*PICTURE) as drawn:
+            Image.fromarray(drawn()).save(Path(path))
+
+    @contextmanager
+    def pictures(self, height: int, width: int) -> Iterator[Callable[[], Picture]]:
+        """Draws the cell as it is whenever it is asked to, (height, width, 3), from where it sees the beginning."""
         camera = self._mujoco.MjvCamera()
         camera.lookat[:2] = 0.5 * (self.object[:2] + self._body.xpos[:2])
         camera.distance, camera.azimuth, camera.elevation = (0.35 if self._arm is None else 1.1), 60.0, -30.0
-        with self._mujoco.Renderer(self._model, *PICTURE) as renderer:
-            renderer.update_scene(self._data, camera)
-            Image.fromarray(renderer.render()).save(Path(path))
+        with self._mujoco.Renderer(self._model, height, width) as renderer:
+
+            def drawn() -> Picture:
+                renderer.update_scene(self._data, camera)
+                return np.array(renderer.render())
+
+            yield drawn
+
+    @contextmanager
+    def viewer(self) -> Iterator[Callable[[], None]]:
+        """A window, drawn anew whenever it is asked to.
+
+        Raises:
+            InputError: where there is no display.
+        """
+        if not any(os.environ.get(name) for name in DISPLAYS) and sys.platform == "linux":
+            raise InputError("there is no display for a window", hint="--film cell.gif makes a film instead.")
+        from mujoco import viewer
+
+        with viewer.launch_passive(self._model, self._data) as shown:
+            yield shown.sync
 
     def _advance(self, until: float) -> None:
         steps = round((until - self.clock.now()) / STEP)
