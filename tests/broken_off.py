@@ -34,6 +34,8 @@ def in_phase(phase, act):
 def interrupts(robot, plan, folder, rest):
     """Ctrl-C in every phase, on one robot that is entered: nothing more is sent, the tool rests, the log can be read.
 
+    The phases in which it was interrupted.
+
     Args:
         rest: within this distance of where it was when it was stopped [m].
     """
@@ -41,6 +43,7 @@ def interrupts(robot, plan, folder, rest):
     def interrupt():
         raise KeyboardInterrupt
 
+    found = []
     for phase in PHASES:
         log = folder / f"{phase}.csv"
         told, cycles, _ = in_phase(phase, interrupt)
@@ -52,7 +55,7 @@ def interrupts(robot, plan, folder, rest):
                 run(plan, robot, log=log, told=told)
         finally:
             del robot.send
-        assert phase_of(cycles[-1]) == phase
+        found.append(phase_of(cycles[-1]))
         assert len(sent) == len(cycles)
         there = robot.state().pose
         robot.clock.wait(robot.clock.now() + robot.limits.age)
@@ -61,6 +64,7 @@ def interrupts(robot, plan, folder, rest):
         robot.clock.wait(robot.clock.now() + 10 * robot.limits.period)
         assert np.allclose(robot.state().pose, rests.pose, atol=2e-5)
         read(log, phase, "interrupted")
+    return tuple(found)
 
 
 def ends(robot, plan, folder, phase, kill):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.broken_off import interrupts
+from tests.broken_off import PHASES, interrupts
 from tests.extras import extra
 
 import flatpush as fp
@@ -307,7 +307,7 @@ def test_a_robot_that_fails_while_it_is_stopped_leaves_a_log(tmp_path):
 @pytest.mark.parametrize("address", ["dry-run", "sim"])
 def test_an_interrupt_stops_in_every_phase(short_plan, tmp_path, address):
     with open_robot(address, short_plan) as robot:
-        interrupts(robot, short_plan, tmp_path, 1e-9)
+        assert interrupts(robot, short_plan, tmp_path, 1e-9) == PHASES
 
 
 def test_bags_hold_standard_messages(tmp_path):

@@ -8,7 +8,7 @@ from ctypes.util import find_library
 import numpy as np
 import pytest
 import shapely
-from tests.broken_off import interrupts
+from tests.broken_off import PHASES, interrupts
 from tests.extras import extra
 
 import flatpush as fp
@@ -198,7 +198,7 @@ def test_without_mujoco_one_line_says_so(short_plan, monkeypatch):
 
 def test_an_interrupt_stops_in_every_phase(short_plan, tmp_path):
     with open_robot("mujoco://tool", short_plan) as robot:
-        interrupts(robot, short_plan, tmp_path, 1e-3)
+        assert interrupts(robot, short_plan, tmp_path, 1e-3) == PHASES
 
 
 def test_the_cell_conforms(short_plan):

@@ -98,7 +98,7 @@ def test_interrupts_and_ends_of_the_controller_stop_in_every_phase(three_feet, t
     pushes = (fp.Push("south", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
     plan = fp.plan(fp.Scene(three_feet, (0.0, -0.03, 0.1), pusher=fp.Pusher(2, 0.018), pushes=pushes))
     with Controller() as controller, robot_at(controller.host) as robot:
-        interrupts(robot, plan, tmp_path, 0.003)
+        assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
     for phase in PHASES:
         with Controller() as controller, robot_at(controller.host, silence=0.5) as robot:
             more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
