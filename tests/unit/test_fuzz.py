@@ -1,11 +1,13 @@
 """The check of tests/fuzz.py sees what is wrong, and finds nothing in random scenes."""
 
+import json
+
 import numpy as np
 import pytest
 
 import flatpush as fp
 
-from ..fuzz import check, exported, main
+from ..fuzz import check, exported, faults, main
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +27,48 @@ def honest(tmp_path_factory):
 
 def test_an_honest_file_has_no_fault(honest):
     assert list(check(*honest)) == []
+
+
+BLOCK = [[-25, -17.5], [25, -17.5], [25, 17.5], [-25, 17.5]]
+TWO = {"fingers": 2, "spacing": 15}
+KINDS = {
+    "one finger": {},
+    "two fingers": {"pusher": TWO},
+    "a finger that rolls": {"pusher": {"turns": False}},
+    "a disc": {"object": {"outline": {"circle": 25}}, "pusher": TWO},
+    "free angle": {"goal": [0, 0, "free"]},
+    "robust": {"planning": {"robust": True}},
+    "set of tables": {"object": {"uncertainty": {"loads": 0.1}}, "pusher": TWO},
+    "many pushes, on the table": {"start": [20, 15, 150], "pusher": TWO | {"transit": "planar"}},
+    "obstacles": {
+        "pusher": TWO,
+        "workspace": {
+            "bounds": [-300, -300, 300, 300],
+            "obstacles": [[[60, -200], [70, -200], [70, 200], [60, 200]]],
+        },
+        "planning": {"margin": {"clearance": 2}},
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_honest_plans_of_every_kind_are_accepted_and_exported_without_a_fault(tmp_path, kind):
+    document = {
+        "flatpush": "scene/1",
+        "units": {"length": "mm", "angle": "deg"},
+        "object": {"name": "block", "outline": BLOCK, "friction": 0.4},
+        "start": [10, -120, 17],
+        "goal": [0, 0, 0],
+        "planning": {"iterations": 30, "time_limit": 1000},
+    }
+    for key, value in KINDS[kind].items():
+        document[key] = {**document.get(key, {}), **value} if isinstance(value, dict) else value
+    outcome, found = faults(document, tmp_path)
+    assert (outcome, found) == ("solved", [])
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    pushes = sum(segment["kind"] == "push" for segment in plan["segments"])
+    assert pushes >= (2 if kind.startswith("many") else 1)
 
 
 def shift(column, amount, part):
