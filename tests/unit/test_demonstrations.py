@@ -1,18 +1,29 @@
 """Demonstrations: each is replayed, the data set is read by the layout's own rules, and breaks leave it readable."""
 
+import errno
 import json
+import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.command_line import flatpush
 from tests.extras import extra
+from tests.waiting import PATIENCE, started, until
 
 import flatpush as fp
-from flatpush.documents import parse_scene
+from flatpush.documents import load_motions, parse_scene, scene_document
 from flatpush.errors import InputError
 
 pytest.importorskip("gymnasium", reason=extra("demonstrations"))
 parquet = pytest.importorskip("pyarrow.parquet", reason=extra("demonstrations"))
+
+from tests.quick_episodes import quick  # noqa: E402
 
 from flatpush.gym import Eyes, PushTask, demonstrations, lerobot  # noqa: E402  # after what they need
 from flatpush.gym.demonstrations import Block, Episode  # noqa: E402
@@ -26,7 +37,7 @@ def made_up(lengths, rng) -> Block:
     """A block of episodes of random numbers."""
     episodes = tuple(
         Episode(int(rng.integers(1000)), 0, rng.normal(size=(n, 10)), rng.normal(size=(n, 2)), rng.normal(size=n), -1,
-                np.zeros(3))
+                np.zeros(3), rng.normal(size=10))
         for n in lengths
     )  # fmt: skip
     return Block(SCENE, episodes, len(episodes))
@@ -127,6 +138,121 @@ def test_a_full_disk_leaves_what_is_complete(tmp_path, monkeypatch, breaks_at):
     assert check(tmp_path / "set")[0]["total_episodes"] == 4
 
 
+def test_the_same_episodes_as_arrays_and_as_bags(tmp_path):
+    """Read by NumPy and by our reader of bags: 12 decisions in which object and finger go 1 mm each."""
+    pytest.importorskip("mcap", reason="mcap is in the extra `export`")
+    pytest.importorskip("rosbags", reason="rosbags is in the extra `export`")
+    n, states = 12, np.zeros((13, 10))
+    states[:, 0] = states[:, 4] = 0.001 * np.arange(13)
+    states[:, 2], states[:, 3], states[:, 5] = np.sin(0.3), np.cos(0.3), -0.02
+    actions = np.tile(np.array([0.5, 0.0], np.float32), (n, 1))
+    episode = Episode(7, 0, states[:n], actions, np.arange(n) / n, 4, np.zeros(3), states[n])
+    folder = lerobot.LeRobotFolder(tmp_path / "set", 0, ("mcap", "gymnasium"))
+    folder.add(Block(SCENE, (episode,), 1), 5)
+    folder.add(Block(SCENE, (episode,), 1), 5)
+    made = sorted(str(p.relative_to(tmp_path / "set")) for p in (tmp_path / "set").glob("[gm][yc]*/**/*.*"))
+    names = [f"{form}/000/episode-00000{k}.{end}" for form, end in (("gymnasium", "npz"), ("mcap", "mcap"))
+             for k in (0, 1)]  # fmt: skip
+    assert made == names
+    with np.load(tmp_path / "set" / names[1]) as archive:
+        arrays = dict(archive)
+    assert np.allclose(arrays["observations"], states, atol=1e-7)
+    assert np.array_equal(arrays["actions"], actions)
+    assert arrays["terminations"].tolist() == [False] * (n - 1) + [True]
+    assert int(arrays["seed"]) == 7
+    (motion,) = load_motions(tmp_path / "set" / names[3]).motions
+    assert np.allclose(motion.times, 0.1 * np.arange(n))
+    assert np.allclose(motion.poses, np.column_stack([states[:n, :2], np.full(n, 0.3)]))
+    assert np.allclose(motion.tips, states[:n, 4:6])
+    with pytest.raises(InputError, match="begun with gymnasium, mcap"):
+        lerobot.LeRobotFolder(tmp_path / "set", 0)
+
+
+# Made-up episodes, quickly, by the command itself in a process of its own.
+QUICK = """
+import signal
+import sys
+sys.path.insert(0, {tests!r})
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from quick_episodes import quick
+from flatpush.gym import demonstrations
+demonstrations.demonstrated = quick
+from flatpush.cli import main
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
+def test_what_was_broken_off_is_readable_and_goes_on(tmp_path, how):
+    """Broken off between or in its writes, it ends as one that was not: the same frames in the same order."""
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps(scene_document(SCENE)))
+    info = tmp_path / "set" / "meta" / "info.json"
+    tests = str(Path(__file__).parents[1])
+    words = [
+        sys.executable,
+        "-c",
+        QUICK.format(tests=tests),
+        "demonstrate",
+        str(scene),
+        "-o",
+        str(info.parents[1]),
+    ]
+    words += ["--workers", "1", "--seed", "3", "-n"]
+    with started([*words, "100000"], stderr=subprocess.PIPE) as running:
+        until(lambda: info.exists() and json.loads(info.read_text())["total_episodes"] >= 4)
+        running.send_signal(getattr(signal, how))
+        _, said = running.communicate()
+    assert running.returncode == (130 if how == "SIGINT" else -signal.SIGKILL), said
+    count = check(info.parents[1])[0]["total_episodes"]
+    folder, number = lerobot.LeRobotFolder(tmp_path / "whole", 3), 0
+    while folder.episodes < count + 3:
+        folder.add(quick(SCENE, 3, number), count + 3 - folder.episodes)
+        number += 1
+    ended = subprocess.run([*words, str(count + 3)], capture_output=True, text=True, timeout=PATIENCE)
+    assert ended.returncode == 0, ended.stderr
+    ours, whole = (check(tmp_path / name) for name in ("set", "whole"))
+    assert ours[1] == whole[1]
+    assert ours[0]["total_frames"] == whole[0]["total_frames"]
+
+
+def test_a_full_disk_is_named(tmp_path, monkeypatch):
+    """After the second block; the status is that of bad input, and what was written is complete."""
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps(scene_document(SCENE)))
+    monkeypatch.setattr(demonstrations, "demonstrated", quick)
+    sync, left = os.fsync, iter(range(100))
+
+    def full(file):
+        if next(left) == 8:  # of six files in a block
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(file)
+
+    monkeypatch.setattr(os, "fsync", full)
+    ended = flatpush("demonstrate", scene, "-o", tmp_path / "set", "--workers", 1, "-n", 9)
+    assert ended.returncode == 2
+    assert "no space left on device" in ended.stderr
+    assert f"{tmp_path}/set/meta" in ended.stderr
+    assert check(tmp_path / "set")[0]["total_episodes"] == 2
+    assert not list((tmp_path / "set").rglob("*.part"))
+
+
+def test_a_cluster_is_given_blocks_by_number_and_they_come_in_order(monkeypatch):
+    monkeypatch.setattr(demonstrations, "demonstrated", quick)
+    given = []
+
+    def spread(function, jobs):
+        given.append([number for _, _, number in jobs])
+        return [function(job) for job in jobs]
+
+    made = demonstrations.blocks([SCENE, SCENE], 5, 3, spread=spread)
+    found = list(islice(made, demonstrations.AT_ONCE + 1))
+    assert given == [list(range(3, 11)), list(range(11, 19))]
+    for number, block in enumerate(found, start=3):
+        assert np.array_equal(block.episodes[0].states, quick(SCENE, 5, number).episodes[0].states)
+
+
 def test_what_is_no_data_set_of_ours_is_left_alone(tmp_path):
     (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="something else"):
@@ -172,7 +298,7 @@ def test_a_replay_notices_another_action_and_another_end():
     for action in actions:
         state, reward, *_ = env.step(action)
         states.append(state)
-    whole = Episode(3, 0, np.array(states[:3]), np.array(actions), np.full(3, reward), -1, np.zeros(3))
+    whole = Episode(3, 0, np.array(states[:3]), np.array(actions), np.full(3, reward), -1, np.zeros(3), state)
     assert not demonstrations.replays(env, whole)  # it leads nowhere
     other = replace(whole, actions=whole.actions * np.float32(0.9))
     assert not demonstrations.replays(env, other)

@@ -1,7 +1,7 @@
 """Demonstrations for learners: episodes of our planner in flatpush/Push-v0, each replayed before it counts."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -22,7 +22,11 @@ FRICTION = (0.0, 0.3)  # between finger and object
 DISTURBED = 0.3  # share of the episodes in which the object is displaced on the way
 WHEN = (10, 150)  # decisions before that
 DISPLACED = (0.004, 0.004, 0.1)  # standard deviations [m, m, rad]
+AT_ONCE = 8  # blocks that a cluster is given
 SAME = 1e-5  # states of a replay agree within this
+
+
+Job = tuple[Scene, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +39,7 @@ class Episode:
         rewards: after each, shape (n,).
         disturbed: number of the decision before which the object was displaced; -1: none.
         displacement: by this in W, shape (3,) [m, m, rad].
+        last: state after the last decision, shape (10,).
     """
 
     seed: int
@@ -44,6 +49,7 @@ class Episode:
     rewards: Array
     disturbed: int
     displacement: Array
+    last: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,9 @@ class Block:
     scene: Scene
     episodes: tuple[Episode, ...]
     tried: int
+
+
+Spread = Callable[[Callable[[Job], Block], Sequence[Job]], Iterable[Block]]
 
 
 def varied(scene: Scene, seed: int, number: int) -> Scene:
@@ -79,11 +88,22 @@ def demonstrated(scene: Scene, seed: int, number: int) -> Block:
     return Block(one, tuple(found), BLOCK)
 
 
-def blocks(scenes: Sequence[Scene], seed: int, first: int, workers: int | None = None) -> Iterator[Block]:
-    """Blocks from a number on, the scenes in turn, made by so many processes (default: the cores), in order."""
+def blocks(
+    scenes: Sequence[Scene], seed: int, first: int, workers: int | None = None, spread: Spread | None = None
+) -> Generator[Block, None, None]:
+    """Blocks from a number on, the scenes in turn, in order.
+
+    Args:
+        workers: how many processes make them; default: the cores.
+        spread: makes several at once instead, as on a cluster.
+    """
+    number = first
+    while spread is not None:
+        jobs = [(scenes[n % len(scenes)], seed, n) for n in range(number, number + AT_ONCE)]
+        yield from spread(_demonstrated, jobs)
+        number += AT_ONCE
     count = workers or os.cpu_count() or 1
     if count == 1:
-        number = first
         while True:
             yield demonstrated(scenes[number % len(scenes)], seed, number)
             number += 1
@@ -101,6 +121,10 @@ def blocks(scenes: Sequence[Scene], seed: int, first: int, workers: int | None =
                 yield done
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _demonstrated(job: Job) -> Block:
+    return demonstrated(*job)
 
 
 def replays(env: PushEnv, episode: Episode) -> bool:
@@ -152,5 +176,12 @@ def _tried(env: PushEnv, policy: PushPolicy, seed: int, number: int) -> Episode 
     if disturbed >= len(states):
         disturbed = -1
     return Episode(
-        seed, number, np.array(states), np.array(actions), np.array(rewards), disturbed, displacement
+        seed,
+        number,
+        np.array(states),
+        np.array(actions),
+        np.array(rewards),
+        disturbed,
+        displacement,
+        np.asarray(state, dtype=float),
     )

@@ -14,6 +14,7 @@ from ..errors import InputError, MissingExtra
 from ..geometry.pose import Array
 from .demonstrations import Block, Episode
 from .task import STATE
+from .trajectories import Form, numbered, save_episode
 
 VERSION = "v3.0"
 CHUNK = 1000  # files in a folder
@@ -40,15 +41,19 @@ def load() -> tuple[ModuleType, ModuleType]:
 class LeRobotFolder:
     """A data set that grows by blocks; what info.json counts is complete, whatever breaks off after.
 
+    Args:
+        folder: that holds it. seed: of all that is random in it.
+        also: forms in which each episode is written beside it.
+
     Attributes:
         episodes, frames: how many are complete. blocks: how many blocks were tried for them.
 
     Raises:
-        InputError: for a folder that holds something else, or a data set of another seed.
+        InputError: for a folder that holds something else, or a data set of another seed or other forms.
     """
 
-    def __init__(self, folder: Path, seed: int) -> None:
-        self.folder, self.seed = folder, seed
+    def __init__(self, folder: Path, seed: int, also: Sequence[Form] = ()) -> None:
+        self.folder, self.seed, self.also = folder, seed, sorted(set(also))
         self.episodes = self.frames = self.blocks = self.files = 0
         self._sums: dict[str, list[Array]] = {}
         info = folder / "meta" / "info.json"
@@ -69,6 +74,10 @@ class LeRobotFolder:
             )
             self._write(DATA.format(**place), self._rows(chosen))
             self._write(EPISODES.format(**place), self._listed(chosen, place))
+            for number, episode in enumerate(chosen, start=self.episodes):
+                for form in self.also:
+                    path = numbered(self.folder, form, number)
+                    save_episode(path, form, episode, FPS, block.scene.pusher.speed)
             for episode in chosen:
                 self._count(episode)
             self.files += 1
@@ -82,7 +91,12 @@ class LeRobotFolder:
             known = json.loads(info.read_text(encoding="utf-8"))
             own = known["flatpush"]
             self.episodes, self.frames = known["total_episodes"], known["total_frames"]
-            self.blocks, self.files, seed = own["blocks"], own["files"], own["seed"]
+            self.blocks, self.files, seed, also = (
+                own["blocks"],
+                own["files"],
+                own["seed"],
+                own.get("also", []),
+            )
             self._sums = {name: [np.array(row) for row in rows] for name, rows in own["sums"].items()}
             for number in (self.episodes, self.frames, self.blocks, self.files):
                 if not (isinstance(number, int) and number >= 0):
@@ -95,6 +109,16 @@ class LeRobotFolder:
                 key="seed",
                 value=seed,
                 hint="Go on with the same, or choose a folder.",
+            )
+
+        if also != self.also:
+            raise InputError(
+                "this data set has other forms beside it",
+                key="--also",
+                value=self.also,
+                hint=f"It was begun with {', '.join(map(str, also)) or 'none'}."
+                if isinstance(also, list)
+                else "",
             )
 
     def _rows(self, episodes: Sequence[Episode]) -> dict[str, ArrayLike]:
@@ -200,6 +224,7 @@ class LeRobotFolder:
             },
             "flatpush": {
                 "seed": self.seed, "blocks": self.blocks, "files": self.files,
+                "also": self.also,
                 "sums": {name: [row.tolist() for row in rows] for name, rows in self._sums.items()},
             },
         }  # fmt: skip
