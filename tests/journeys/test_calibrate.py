@@ -155,6 +155,7 @@ def renamed(log, target, without=()):
 OWN = "{object: what, run: try, t: clock, x: ox, y: oy, theta: yaw, px: hx, py: hy, ptheta: hyaw}"
 
 
+@pytest.mark.slow
 def test_names_of_columns_that_the_scene_gives_hold_for_calibrate_and_replay(tmp_path):
     (log,) = logs(tmp_path)
     own = renamed(log, tmp_path / "own.csv")

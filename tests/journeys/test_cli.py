@@ -253,7 +253,13 @@ def test_interrupting_a_search_among_obstacles_keeps_the_best_plan(folder):
     assert flatpush("verify", "plan.json", folder=folder).returncode == 0
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+DEAR = {"bracket", "l_shape", "maze", "soap", "workshop"}
+
+
+@pytest.mark.parametrize(
+    "example",
+    [pytest.param(e, marks=[pytest.mark.slow] * (e.stem in DEAR), id=e.stem) for e in EXAMPLES],
+)
 def test_every_example_plans_and_verifies(example, tmp_path):
     made = flatpush("plan", example, "-o", "plan.json", folder=tmp_path)
     assert made.returncode == 0, made.stderr

@@ -35,7 +35,7 @@ def call(*arguments):
     return app([str(a) for a in arguments], standalone_mode=False)
 
 
-@pytest.mark.parametrize("law", ["path", "dfl"])
+@pytest.mark.parametrize("law", ["path", pytest.param("dfl", marks=pytest.mark.slow)])
 def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     _, path = plan
     figure = tmp_path / "run.svg"
@@ -55,6 +55,7 @@ def test_a_plan_is_tracked_reported_and_drawn(plan, law, tmp_path, capsys):
     assert first["turn"] < np.deg2rad(1)
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_run_and_ending_beside_the_goal_has_a_status(plan, capsys):
     again = ("track", plan[1], "--controller", "path", "--friction", 0.35, "--seed", 3, "--json")
     assert call(*again, "--tolerance", "1,1") == 0
@@ -148,7 +149,10 @@ def test_frames_of_before_the_pusher_went_on_are_no_news(plan):
     np.testing.assert_allclose(state.phase.poses, [frame.object])
 
 
-@pytest.mark.parametrize(("frames", "noise"), [(15, 0.3), (60, 0.3), (120, 1.0)])
+@pytest.mark.parametrize(
+    ("frames", "noise"),
+    [(60, 0.3), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((15, 0.3), (120, 1.0)))],
+)
 def test_it_lands_whatever_the_camera(plan, frames, noise):
     """The place to land at is the mean of what was seen at rest, so that it does not run away with the noise."""
     camera = Camera(rate=frames, position=noise / 1000, angle=np.deg2rad(noise))
@@ -204,7 +208,7 @@ def test_every_limit_is_kept_with_noise(plan, law):
     assert min(shares["speed"], shares["travel_speed"]) > 0.9  # and they are used
 
 
-@pytest.mark.parametrize("law", ["path", "dfl"])
+@pytest.mark.parametrize("law", ["path", pytest.param("dfl", marks=pytest.mark.slow)])
 def test_two_fingers_carry_the_object_without_sliding(two_finger_plan, law):
     run = TrackedRun(law, camera=PERFECT).of(two_finger_plan)
     assert run.outcome == "arrived"

@@ -13,7 +13,7 @@ from flatpush.geometry import cross, perpendicular, rotate
 
 ROUNDING = 1e-9  # of the load, with the radius as the unit of torque: what Support promises
 SOLVED = 1e-8  # of inverses: rounding of a twist beside a foot costs more than that of a wrench
-examples = settings(max_examples=60, deadline=None, derandomize=True)
+examples = settings(max_examples=40, deadline=None, derandomize=True)
 
 
 def shifted(wrench: np.ndarray, to: np.ndarray) -> np.ndarray:

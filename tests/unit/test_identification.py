@@ -279,6 +279,7 @@ def called(*arguments: str) -> tuple[int, str, str]:
     return ended.returncode, ended.stdout, ended.stderr
 
 
+@pytest.mark.slow
 def test_identify_writes_a_surface_that_a_scene_can_name(tmp_path) -> None:
     path = write(tmp_path / "three feet.csv", table(pairs(30, noise=0.02)))
     scene = tmp_path / "scene.yaml"

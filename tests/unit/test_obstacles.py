@@ -106,7 +106,7 @@ def test_random_trees_find_a_first_way(query):
     assert Trees(query, 0, 3).path is None
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_the_robot_maze_is_solved_and_improved(query, seed):
     """The stored plan costs 0.862; after some tenths of a second ours cost what a prototype's took longer to reach."""
     search = Search(query, seed)
@@ -123,6 +123,7 @@ def test_same_seed_and_work_same_way(query):
     assert one.best.pieces == two.best.pieces
 
 
+@pytest.mark.slow
 def test_every_stored_maze_is_solved_and_cheaper_than_its_stored_plan(data_folder):
     """All twelve, read from their files; the stored plans of some of them touch the walls."""
     stored = json.loads((data_folder / "maze" / "stored_paths_clearance_check.json").read_text())

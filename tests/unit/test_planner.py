@@ -24,6 +24,7 @@ def planner(rectangle):
     return fp.Planner(scene)
 
 
+@pytest.mark.slow
 def test_levels_never_get_worse(planner):
     for start in STARTS:
         found = planner.plan(start)

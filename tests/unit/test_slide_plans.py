@@ -176,6 +176,7 @@ def test_a_slide_and_a_push_in_one_plan(tmp_path):
     assert fp.verify(parse_plan(json.loads(json.dumps(plan_document(plan))))).ok
 
 
+@pytest.mark.slow
 def test_one_finger_goes_around_on_the_table_and_keeps_its_clearance(around):
     assert around.status == "solved"
     assert fp.verify(around).ok
