@@ -1,5 +1,7 @@
 """flatpush/Push-v0: Gymnasium's checker, the plant behind it, many at once, success, pictures, noise, the baseline."""
 
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +52,19 @@ def test_the_same_seed_is_the_same_episode_and_others_differ():
     first = run(3)
     assert np.array_equal(first, run(3))
     assert not np.allclose(first, run(4), atol=1e-3)
+
+
+@pytest.mark.parametrize("twin", [deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_an_environment_in_use_can_be_copied_and_sent(twin):
+    """It goes on as the first; noise and late frames included. After steps pickle refused it."""
+    one = made(noise=fp.Noise(), eyes=Eyes(1e-3, 0.02, 1, 0.2))
+    one.reset(seed=2, options={"start": [0, 0, 0], "hand": [0.0, -0.025, 0.0]})
+    for _ in range(5):
+        one.step([0.0, 1.0])
+    other = twin(one)
+    seen = [[env.step([0.2, 1.0])[0] for _ in range(5)] for env in (one, other)]
+    assert np.array_equal(*seen)
+    assert not np.array_equal(seen[0][0], seen[0][-1])
 
 
 def test_a_decision_is_what_the_plant_does():

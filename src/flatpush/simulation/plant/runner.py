@@ -134,6 +134,12 @@ class Runner:
         """Whether the steps that are compiled know its surface and its number of fingers."""
         return self._own is not None
 
+    def __reduce__(self) -> tuple[type["Runner"], tuple[object, ...]]:
+        """For pickle and copies: made anew, as the kernel and rows for the interpreter belong to a process."""
+        own = self._plain
+        given = own.outline, own.surface, own.cof, own.friction, own.radius, own.tips, not self.compiled
+        return Runner, given
+
     def step(self, q: Array, way: Array) -> Done:
         """One run from X_WO q (3,) under hands that go straight between two poses (2, h, 3), the first known.
 
