@@ -94,12 +94,13 @@ class Sequences:
 
     def merged(self, pushes: np.ndarray, poses: Array) -> Candidate:
         """The same, equal neighbours being joined to one leg."""
-        same = np.flatnonzero(pushes[1:] == pushes[:-1])
-        if len(same) == 0:
+        kept = np.ones(
+            len(poses), dtype=bool
+        )  # of two equal pushes the last goes on, from where the first began
+        np.not_equal(pushes[1:], pushes[:-1], out=kept[1:-1])
+        if kept.all():
             return self.candidate(pushes, np.ascontiguousarray(poses))
-        return self.candidate(
-            np.delete(pushes, same), np.ascontiguousarray(np.delete(poses, same + 1, axis=0))
-        )
+        return self.candidate(pushes[kept[1:]], poses[kept])
 
     def direct(self) -> Candidate:
         """The best single push."""

@@ -191,9 +191,9 @@ def _without(sequences: Sequences, found: Candidate) -> list[Candidate]:
     """The plan without one of its legs, where that is not much dearer; equal neighbours become one leg."""
     shorter = []
     for i in range(len(found.pushes) if len(found.pushes) > 1 else 0):
-        pushes = np.delete(found.pushes, i)
+        pushes = found.pushes[np.arange(len(found.pushes)) != i]
         for gone in {max(i, 1), min(i + 1, len(found.pushes) - 1)}:
-            merged = sequences.merged(pushes, np.delete(found.poses, gone, axis=0))
+            merged = sequences.merged(pushes, found.poses[np.arange(len(found.poses)) != gone])
             if merged.cost < 1.2 * found.cost:
                 shorter.append(merged)
     return shorter
