@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,20 @@ def test_derivatives_are_those_of_the_plant(family):
         misses += (np.linalg.norm(numeric - here.jacobian[:, :, k], axis=1)[tells] / size[tells]).tolist()
     assert np.median(misses) < 0.03  # stretches in which the contact changes its mode are off by more
     assert np.percentile(misses, 75) < 0.3
+
+
+def test_what_the_model_leaves_out_grows_with_the_way():
+    """An end of a stretch is so much less sure, in proportion to the finger's way."""
+    seen = look(pushed(), EXPECTED.outline, TIP)
+    z = np.append(KnownFeet(np.array(FEET), LOADS).mean, np.log(0.3))
+    few, many = (
+        _Search(KnownFeet(np.array(FEET), LOADS), one, EXPECTED, TIP, np.log(0.3)).roll(z).covariance
+        for one in (replace(seen, model=(0.0, 0.0)), replace(seen, model=(0.1, 2.0)))
+    )
+    way = np.hypot(*(seen.stretches.tips[:, -1] - seen.stretches.tips[:, 0]).T)
+    assert np.diagonal(many - few, axis1=1, axis2=2) == pytest.approx(
+        np.outer(way**2, [0.01, 0.01, 4.0]), rel=1e-6
+    )
 
 
 @pytest.mark.slow

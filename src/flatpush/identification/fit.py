@@ -26,8 +26,6 @@ FREE = (3, 4, 6)
 SOFT = 2.5
 # Standard deviation of log μ before anything is seen; a friction above this is not told from sticking for ever.
 SD_FRICTION, MOST_FRICTION = 1.0, 3.0
-# What the quasi-static model leaves out, by the length of a stretch: in place, and in angle [rad].
-MODEL_PLACE, MODEL_ANGLE = 0.001, 0.0005
 # A contact slides where it slips by more than this part of the finger's way.
 SLIPS = 0.1
 _ROUNDS, _STEPS, _REWEIGHTED = 4, 15, 15
@@ -300,7 +298,8 @@ class _Search:
         place, angle = self.seen.noise
         one = np.diag([place**2, place**2, angle**2])
         length = np.linalg.norm(s.tips[:, -1] - s.tips[:, 0], axis=1)
-        model = np.diag([MODEL_PLACE**2, MODEL_PLACE**2, MODEL_ANGLE**2 / 0.01**2])
+        off, turned = self.seen.model
+        model = np.diag([off**2, off**2, turned**2])
         start = np.where(good[:, None, None], found.start, np.eye(3))
         carried = start @ one @ np.swapaxes(start, 1, 2)
         return (

@@ -18,6 +18,8 @@ PLACES = 9
 LEAST_FRAMES = 5  # of a local quadratic
 # The object moves where, over the smoothing window, it goes so much of the finger's way, and more than noise.
 MOVES, ABOVE_NOISE = 0.1, 4.0
+# What the quasi-static model leaves out of a stretch, by its length: in place, and in angle [rad/m].
+MODEL = (0.001, 0.05)
 # While it moves, its outline is so near the finger, by its size, or scene and recording do not belong together [m].
 NEAR, NEAR_SIZE = 0.002, 0.04
 # A tag that jumps: between two frames the object goes so much farther than the finger, and turns so much [m, rad].
@@ -73,12 +75,14 @@ class Seen:
     Attributes:
         frames, stretches: of all recordings. noise: standard deviation of one frame, place [m] and angle [rad].
         notes: recordings that say little, in words.
+        model: what the quasi-static model leaves out, by the length of a stretch: in place, and in angle [rad/m].
     """
 
     frames: Frames
     stretches: Stretches
     noise: tuple[float, float]
     notes: tuple[str, ...]
+    model: tuple[float, float] = MODEL
 
     @property
     def longest(self) -> float:
@@ -253,11 +257,17 @@ def _cut(part: Frames, motion: Motion, a: int, push: int) -> list[tuple[Array, A
     return found
 
 
-def seen_of(stretches: Stretches, outline: Outline, tip_radius: float, noise: tuple[float, float]) -> Seen:
+def seen_of(
+    stretches: Stretches,
+    outline: Outline,
+    tip_radius: float,
+    noise: tuple[float, float],
+    model: tuple[float, float] = MODEL,
+) -> Seen:
     """What stretches say of which only both ends were measured; the moment in the middle stands for each.
 
     Args:
-        noise: standard deviation of an end's place [m] and angle [rad].
+        noise: standard deviation of an end's place [m] and angle [rad]. model: see Seen.
     """
     step = relative(stretches.starts, stretches.ends)
     way = np.hypot(*(stretches.tips[:, -1] - stretches.tips[:, 0]).T)
@@ -269,4 +279,4 @@ def seen_of(stretches: Stretches, outline: Outline, tip_radius: float, noise: tu
     slides = rotate(-poses[:, 2], (stretches.tips[:, -1] - stretches.tips[:, 0]) / way[:, None])
     variance = np.ones(len(way))
     frames = Frames(poses, variance, twists / way[:, None], tips, slides, points, normals, corner, way, gaps)
-    return Seen(frames, stretches, noise, ())
+    return Seen(frames, stretches, noise, (), model)
