@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import flatpush as fp
-from flatpush.geometry import compose, exp, transform
+from flatpush.geometry import compose, exp, pose_error, relative, transform
 from flatpush.simulation.plant import MODES, Plant
 
-from .mujoco_reference import push
+from .mujoco_reference import Reference, push
 
 RADIUS, WAY = 0.0025, 0.05  # [m]
 DISTANCE, ANGLE = 1e-4, np.deg2rad(0.1)
@@ -107,3 +107,25 @@ def test_two_fingers_on_an_arc(name, place, centre, kept):
         thing, np.zeros(3), tips, RADIUS, length=sense * WAY, centre=centre, boxes=BOXES.get(name, ())
     )
     assert_same(run.object[-1], reference)
+
+
+@pytest.mark.slow
+def test_the_friction_that_a_plan_leaves_in_reserve_is_what_it_can_lose():
+    """The certificate's friction margin m of a designed plan: with a little more than (1 - m) μ between fingers and
+    object it goes with the hand, with a tenth less it slides along them by more than a millimetre."""
+    thing, mu = THINGS["rectangle"], THINGS["rectangle"].friction
+    pushes = (fp.Push("below", thing.outline.nearest((0.0, -0.0175)), 2, 0.018),)
+    pusher = fp.Pusher(fingers=2, spacing=0.018, tip_radius=RADIUS)
+    plan = fp.plan(fp.Scene(thing, (-0.02, -0.05, -0.7), pusher=pusher, pushes=pushes))
+    margin, (segment,) = plan.certificate.friction_margin, plan.pushes
+    assert 0.19 < margin < 0.5
+    hands, start = np.asarray(segment.pusher), np.asarray(segment.object[0])
+    grasp = relative(start, hands[0])
+    for share, least, most in ((1.05, 0.0, 0.25e-3), (0.9, 1e-3, 2e-3)):
+        weaker = fp.Object(thing.outline, thing.support, share * (1 - margin) * mu)
+        ends = Reference(weaker, np.asarray(segment.fingers), RADIUS, BOXES["rectangle"]).follow(start, hands)
+        off = pose_error(relative(ends[-1], hands[-1]), grasp)
+        print(f" {share:.2f} of (1 - m) μ: {1000 * off[0]:.3f} mm along the edge, {np.rad2deg(off[2]):.4f}°")
+        # Soft contacts creep by some 0.15 mm on this way of 80 mm.
+        assert least <= abs(off[0]) <= most
+        assert abs(off[2]) < ANGLE
