@@ -208,14 +208,14 @@ def test_a_task_among_things_ends_at_its_goal_and_touches_nothing(number):
 @pytest.mark.slow
 def test_tasks_among_things_end_at_their_goals_and_touch_nothing():
     """`python benchmarks/feedback_among.py` runs more."""
-    numbers = [k for k in range(8, 16) if crowded_task(k).steerable]
+    numbers = [k for k in range(8, 11) if crowded_task(k).steerable]
     ends = []
     for number in numbers:
         ended, run = attempt_among(crowded_task(number))
         ends.append(ended)
         assert least_room(crowded_task(number).scene, run, TIPS) > -1e-4
         assert not ended.touched
-    assert sum(end.good for end in ends) >= len(ends) - 1
+    assert all(end.good for end in ends)
 
 
 def run_of(controller, scene, seconds, told=None):
