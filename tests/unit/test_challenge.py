@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.extras import extra
 
 import flatpush as fp
 from flatpush.geometry import relative, transform
@@ -132,7 +133,7 @@ def test_results_are_told_again(challenge):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_both_judges_see_the_same_stroke(challenge, friction):
     """A push beside the centre, which slides without friction; MuJoCo at the speed at which it judges."""
-    pytest.importorskip("mujoco", reason="mujoco is in the extra `sim`")
+    pytest.importorskip("mujoco", reason=extra("sim"))
     scene, judge = square(friction=friction), challenge["judge"]
     hands = judge.finer(scene, upwards(0.03, x=0.008))
     ends = [judge.PHYSICS[name](scene).stroke(scene.start_pose, hands)[-1] for name in ("plant", "mujoco")]

@@ -140,8 +140,8 @@ def test_a_full_disk_leaves_what_is_complete(tmp_path, monkeypatch, breaks_at):
 
 def test_the_same_episodes_as_arrays_and_as_bags(tmp_path):
     """Read by NumPy and by our reader of bags: 12 decisions in which object and finger go 1 mm each."""
-    pytest.importorskip("mcap", reason="mcap is in the extra `export`")
-    pytest.importorskip("rosbags", reason="rosbags is in the extra `export`")
+    pytest.importorskip("mcap", reason=extra("export"))
+    pytest.importorskip("rosbags", reason=extra("export"))
     n, states = 12, np.zeros((13, 10))
     states[:, 0] = states[:, 4] = 0.001 * np.arange(13)
     states[:, 2], states[:, 3], states[:, 5] = np.sin(0.3), np.cos(0.3), -0.02

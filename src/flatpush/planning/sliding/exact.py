@@ -194,7 +194,7 @@ class SlidePlanner:
                 X_WO = compose(X_WO, slides.displacement[k])
 
     def made(self, X_WO: Array, numbers: tuple[int, ...]) -> list[SlidePush] | None:
-        """Pushes of the library, by their numbers, made one after another from a pose (3,); None if they cannot be."""
+        """Pushes of the library, by their numbers, one after another from X_WO (3,); None if they cannot be made."""
         return self._rolled_out(X_WO, self._parameters(list(numbers)))
 
     def _parameters(self, numbers: list[int]) -> Array:
