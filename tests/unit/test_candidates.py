@@ -150,3 +150,14 @@ def test_an_origin_ten_kilometres_away_changes_nothing() -> None:
     assert distant.certificate.friction_margin == pytest.approx(near.certificate.friction_margin, rel=SAME)
     assert fp.verify(distant).ok
     assert np.hypot(*distant.scene.object.outline.centroid) < 1e-9
+
+
+def test_a_push_is_called_after_the_side_where_it_pushes() -> None:
+    """Top, rounded corner and right side are one stretch, whose middle looks north-east; it is pushed on the top."""
+    turn = np.linspace(np.pi / 2, 0, 21)
+    arc = np.column_stack([0.055 + 0.005 * np.cos(turn), 0.015 + 0.005 * np.sin(turn)])
+    corners = np.concatenate([[(-0.02, 0.02)], arc, [(0.06, -0.02), (-0.02, -0.02)]])
+    for name, _, normal in pushes(corners, fingers=2):
+        winds = {"east": (1, 0), "north": (0, 1), "west": (-1, 0), "south": (0, -1)}
+        looks = sum(np.array(winds[wind]) for wind in name.split()[0].split("-"))
+        assert -normal @ looks / np.linalg.norm(looks) > np.cos(np.deg2rad(22.6)), name

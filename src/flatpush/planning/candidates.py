@@ -37,7 +37,10 @@ _known: WeakKeyDictionary[Object, dict[tuple[Any, ...], Found]] = WeakKeyDiction
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A part of an outline without sharp corners, as edges and lengths along it."""
+    """A part of an outline without sharp corners, as edges and lengths along it.
+
+    Without a name it is called after the side of the place on it that is pushed.
+    """
 
     name: str
     edges: tuple[int, ...]
@@ -99,10 +102,14 @@ def _automatic_pushes(scene: Scene) -> Found:
     refused: list[PushOption] = []
     many = len(outline.vertices) > MANY
     coarse, fine = _simplified(scene) if many else (scene, scene)
+    names: list[str] = []
     for stretch in stretches(coarse.object.outline):
         option = _best_of_many(coarse, fine, stretch) if many else _best(scene, stretch)
         if option is None:
             continue
+        if stretch.name == "":
+            names.append(_side(option.push.at.normal, names))
+            option = replace(option, push=replace(option.push, name=names[-1]))
         (refused if option.car is None else found).append(option)
     kept = _spread(found)
     refused += [
@@ -193,19 +200,18 @@ def stretches(outline: Outline) -> list[Stretch]:
             found.append([])
             turned = 0.0
         found[-1].append(int(order[place]))
-    named: list[Stretch] = []
-    for g in found:
-        name = f"edge {g[0]}"
-        if len(g) > 1 or n > FEW:
-            name = _side(outline.edge_normals[g[len(g) // 2]], [stretch.name for stretch in named])
-        named.append(Stretch(name, tuple(g), lengths[g], backwards=outline.sense < 0))
-    return named
+    names = ["" if len(g) > 1 or n > FEW else f"edge {g[0]}" for g in found]
+    return [
+        Stretch(name, tuple(g), lengths[g], backwards=outline.sense < 0)
+        for name, g in zip(names, found, strict=True)
+    ]
 
 
 def _side(inward: Array, taken: list[str]) -> str:
     """The name of a side by the compass, east along +x of the drawing; numbered where there are several."""
     winds = "east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east"
-    name = f"{winds[round(float(np.arctan2(-inward[1], -inward[0])) / (np.pi / 4)) % 8]} side"
+    eighths = float(np.arctan2(-inward[1], -inward[0])) / (np.pi / 4)
+    name = f"{winds[round(eighths - EQUAL) % 8]} side"  # halfway between two is not decided by rounding
     number = 1 + sum(other == name or other.startswith(f"{name} ") for other in taken)
     return name if number == 1 else f"{name} {number}"
 

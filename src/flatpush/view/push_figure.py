@@ -10,6 +10,7 @@ from ..documents.shapes import DrawnOutline
 from ..errors import InputError
 from ..geometry import cross, perpendicular
 from ..geometry.pose import Array
+from ..planning.candidates import FEW
 from ..problem import Scene
 from . import drawing as d
 from . import palette, words
@@ -102,7 +103,10 @@ def draw_sketches(scene: Scene, sketches: Sequence[PushSketch], note: OutlineNot
 
 
 def draw_source(page: Drawing, drawn: DrawnOutline, frame: Box) -> None:
-    """What was drawn, in O: the outline that was taken in black, what was left out in grey, and the axes of O."""
+    """What was drawn, in O: the outline that was taken in black, what was left out in grey, and the axes of O.
+
+    The edges have their numbers where pushes are named by them.
+    """
     outline = drawn.outline.polyline()
     size = drawn.outline.size
     low, high = outline.min(axis=0), outline.max(axis=0)
@@ -117,9 +121,15 @@ def draw_source(page: Drawing, drawn: DrawnOutline, frame: Box) -> None:
     for points in parts:
         panel.line(MM * points, Look("#9a9a9a", 0.8), 3)
     ring = MM * np.concatenate([outline, outline[:1]])
-    labels = Labels(panel, dense(ring, panel.unit(3.0)))
-    for name, axis in (("x of O", (0.3, 0.0)), ("y of O", (0.0, 0.3))):
-        head = size * np.array(axis)
+    axes = {"x of O": size * np.array([0.3, 0.0]), "y of O": size * np.array([0.0, 0.3])}
+    lines = [ring, *(MM * np.stack([np.zeros(2), head]) for head in axes.values())]
+    labels = Labels(panel, np.concatenate([dense(line, panel.unit(3.0)) for line in lines]))
+    if not drawn.outline.is_circle and len(outline) <= FEW:
+        for k, (middle, inward) in enumerate(
+            zip(drawn.outline.edges.mean(axis=1), drawn.outline.edge_normals, strict=True)
+        ):
+            _name(panel, labels, MM * middle, -inward, str(k), SOFT)
+    for name, head in axes.items():
         panel.arrow(np.zeros(2), MM * head, INK, 0.9, 6.5)
         if panel.holds(MM * head):
             _name(panel, labels, MM * head, head, name, INK)
