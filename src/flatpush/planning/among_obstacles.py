@@ -14,7 +14,7 @@ from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Segments, assemble
 from .empty_table import Found, refined_paths
-from .obstacles import Portfolio, careful, obstructions, pruned, query_of, widest_way
+from .obstacles import FINE_KNOT, KNOT, Search, careful, obstructions, pruned, query_of, widest_way
 from .options import PushOption
 from .path import Path
 from .segments import SAG
@@ -23,9 +23,9 @@ from .transits import Transits
 # For each of the scene's iterations the search may expand so many poses or try so many moves in all, and without an
 # improvement of at least BETTER.
 WORK, PATIENCE = 30, 4
+PATIENCE_FREE = 2  # where the angle at the goal is free: the last polish takes its share
 BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
 LARGEST_GAP = 1.0  # clearances beyond it are not told apart [m]
-MOST = 4  # angles at the goal that are searched for where any will do
 SAMPLES = 7  # points of an edge that is drawn
 Progress = Callable[[float, float, int], object]
 
@@ -34,7 +34,7 @@ class AmongObstacles:
     """One scene among obstacles.
 
     Args:
-        endpoints: where the object may end, shape (e, 3), the most promising first: the goal, or several angles there.
+        endpoints: where the object may end, shape (e, 3), the most promising first: the goal, or angles all around.
 
     Attributes:
         search: the search, for what it has seen.
@@ -52,17 +52,18 @@ class AmongObstacles:
         endpoints: Array,
     ) -> None:
         self.scene, self.options, self.transits, self.progress = scene, options, transits, progress
-        first = query_of(scene, options, fleet, endpoints[0])
-        queries = [first, *(replace(first, goal=goal) for goal in endpoints[1:])]
-        self.queries = [query for query in queries if query.last][:MOST] or [first]
-        self.search = Portfolio(self.queries, scene.planning.seed)
-        self.best, self.refused = np.inf, 0
+        self.query = query_of(scene, options, fleet, endpoints[0])
+        ends = [pose for pose in endpoints if self.query.able(pose)]
+        if len(endpoints) > 1 and ends:
+            self.query = replace(self.query, goal=ends[0], other_goals=np.array(ends[1:]).reshape(-1, 3))
+        self.search = Search(self.query, scene.planning.seed)
+        self.best, self.refused, self._knot = np.inf, 0, KNOT
         self.complaint = self.stopped_by = ""
         self._first: float | None = None
 
     def plans(self) -> Iterator[tuple[Found, Segments]]:
         """Better and better paths that are plans as a whole; ends with the limits of the scene."""
-        self.complaint = obstructions(self.scene, self.queries[0], self.options)
+        self.complaint = obstructions(self.scene, self.query, self.options)
         if self.complaint:
             return
         began = clock()
@@ -72,8 +73,7 @@ class AmongObstacles:
                 yield plan
             else:
                 # The hand did not find its way at a change of push: from now on changes have room to spare.
-                queries = [careful(self.scene, query) for query in self.queries]
-                self.search = Portfolio(queries, self.scene.planning.seed)
+                self.search = Search(careful(self.scene, self.query), self.scene.planning.seed)
                 break
         else:
             return
@@ -82,10 +82,10 @@ class AmongObstacles:
             if plan is not None:
                 yield plan
 
-    def _rounds(self, began: float, search: Portfolio) -> Iterator[Path]:
+    def _rounds(self, began: float, search: Search) -> Iterator[Path]:
         """Paths that are worth checking."""
         planning = self.scene.planning
-        given, fresh = np.inf, True
+        given, before, fresh = np.inf, np.inf, True
         known, since = np.inf, 0  # a cost, and the work after which nothing much better was found
         for path in search.rounds():
             spent = clock() - began
@@ -93,14 +93,23 @@ class AmongObstacles:
                 self.progress(self.best, spent, search.nodes)
             if search.cost < known * (1 - BETTER):
                 known, since = search.cost, search.work
-            patience = np.inf if path is None else PATIENCE * planning.iterations
+            patience = (PATIENCE_FREE if self.scene.free_angle else PATIENCE) * planning.iterations
+            patience = np.inf if path is None else patience
             done = search.work >= WORK * planning.iterations or search.work - since >= patience
             self.stopped_by = "time_limit" if spent > planning.time_limit else "iterations" if done else ""
             done = bool(self.stopped_by)
             worth = min(given, self.best) * (1.0 if done else 1 - BETTER)
-            if path is not None and search.cost < worth:
+            # While it falls from round to round, the next is soon better.
+            settled = done or np.isinf(given) or search.cost > before * (1 - BETTER)
+            before = search.cost
+            if path is not None and settled and search.cost < worth:
                 given = search.cost
                 yield path
+            if done and self.scene.free_angle and self.stopped_by != "time_limit":
+                self._knot = FINE_KNOT
+                path = search.finish()
+                if path is not None and search.cost < min(given, self.best):
+                    yield path
             if done:
                 return
             if fresh and path is not None and search.direct:
@@ -110,10 +119,10 @@ class AmongObstacles:
                         yield search.best
                     return
 
-    def _free(self, search: Portfolio) -> bool:
+    def _free(self, search: Search) -> bool:
         """Whether what is best without obstacles keeps clear of them: then there is nothing left to search for."""
         clear = False
-        for done, found in enumerate(refined_paths(self.scene, self.queries[0].fleet)):
+        for done, found in enumerate(refined_paths(self.scene, self.query.fleet)):
             clear = search.offer(found.path)
             if done > 0 and not clear:
                 return False
@@ -122,7 +131,7 @@ class AmongObstacles:
     def _checked(self, path: Path, began: float) -> tuple[Found, Segments] | None:
         """The plan of a path, if it is one as a whole, with the pusher's transits."""
         scene, need = self.scene, self.scene.clearance
-        shorter = pruned(self.queries[0], path)
+        shorter = pruned(self.query, path, self._knot)
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if self.search.value(shorter) < self.best else path
         try:
@@ -131,7 +140,7 @@ class AmongObstacles:
             self.refused += 1
             self.complaint = f"{error}."
             return None
-        room = hand_clearance(scene, self.queries[0].world, segments)
+        room = hand_clearance(scene, self.query.world, segments)
         if room < need:
             self.refused += 1
             self.complaint = (
@@ -153,7 +162,7 @@ class AmongObstacles:
         keeping = f" with {need:.2f} mm of clearance" if need > 0 else ""
         if self.complaint and not search.nodes:
             return self.complaint
-        way, wide = (2000 * radius for radius in widest_way(self.queries[0]))
+        way, wide = (2000 * radius for radius in widest_way(self.query))
         if search.closed or way < 0.99 * wide:  # over finer cells than the search's own
             room = f"no way is wider than about {way:.1f} mm" if way > 0 else "nothing gets through at all"
             return (
@@ -170,7 +179,7 @@ class AmongObstacles:
         )
         return (
             f"{head}: {search.nodes} poses were searched from the start and from the goal with"
-            f" {self.queries[0].fleet.size} pushes{finest}.{refused}\n"
+            f" {self.query.fleet.size} pushes{finest}.{refused}\n"
             "More time (time_limit, iterations), less clearance or other pushes may help."
         )
 

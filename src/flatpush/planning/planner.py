@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..compiling import clock
 from ..errors import FlatpushError, InputError
+from ..geometry.collision import Body, World, pose_clearance
 from ..geometry.pose import Array, wrap_angle
 from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
@@ -25,14 +26,14 @@ from .candidates import automatic_pushes
 from .controllability import Controllability, controllability
 from .empty_table import ROUND, Found, direct_paths, refined_paths
 from .fleets import fleet_of
-from .obstacles import check_endpoints
+from .obstacles import TOUCHING, check_endpoints
 from .options import PushOption, push_options
 from .transits import Transits
 
 if TYPE_CHECKING:
     from .sliding import SlidePlanner
 
-APART = np.deg2rad(40)  # between two angles at a free goal that are searched for among obstacles
+APART = np.deg2rad(9)  # between two angles at a free goal that are searched for among obstacles
 # Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
 ROUNDS_OF_MANY = 1
 
@@ -138,7 +139,7 @@ class Planner:
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
         best, stopped_by, details = np.inf, "", dict[str, Any]()
-        reasons, blocked = self.reasons, ""
+        reasons = self.reasons
         if _crowded(scene):
             endpoints = self._fitting(scene) if scene.free_angle else scene.goal_pose[None]
             self._among = AmongObstacles(
@@ -148,7 +149,6 @@ class Planner:
                 best, details = found.cost, found.details
                 yield Answer(best, partial(_solved, scene, segments, began, details), details)
             stopped_by = self._among.stopped_by
-            blocked = self._among.tried
         else:
             for found in self._candidates(scene):
                 stopped_by = found.details.pop("stopped_by", "")
@@ -168,7 +168,8 @@ class Planner:
                 best = answer.cost
                 yield answer
         if np.isinf(best):
-            lines = (blocked.strip(), _listed(reasons))
+            blocked = "" if self._among is None else self._among.tried.strip()
+            lines = (blocked, _listed(reasons))
             yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
 
     @property
@@ -252,25 +253,19 @@ class Planner:
             InputError: if it fits with none, what is in the way with the cheapest.
         """
         place = scene.goal_pose[:2]
-        costs, headings = cheapest_headings(self.fleet, scene.start_pose, place)
         turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
-        all_around = fleet_lengths(self.fleet, scene.start_pose, [(*place, turn) for turn in turns]).min(
-            axis=0
-        )
-        angles = np.concatenate([headings[:, 0], turns])
+        costs = fleet_lengths(self.fleet, scene.start_pose, [(*place, turn) for turn in turns]).min(axis=0)
+        tried = turns[np.argsort(costs, kind="stable")]
+        world = World.of(scene.workspace.bounds, scene.workspace.obstacles)
+        body, need = Body.of(scene.object.outline), scene.clearance - TOUCHING
         fits: list[tuple[float, ...]] = []
-        complaint: InputError | None = None
-        for angle in angles[np.argsort(np.concatenate([costs[:, 0], all_around]), kind="stable")]:
-            if any(abs(wrap_angle(angle - other)) < APART for *_, other in fits):
-                continue
-            try:
-                check_endpoints(replace(scene, goal=(*place, angle)))
-            except InputError as error:
-                complaint = complaint or error
-            else:
-                fits.append((*place, angle))
-        if not fits and complaint is not None:
-            raise complaint
+        for angle in tried:
+            pose = (*place, angle)
+            if all(abs(wrap_angle(angle - other)) >= APART for *_, other in fits) and (
+                pose_clearance(world, body, pose) >= need
+            ):
+                fits.append(pose)
+        check_endpoints(replace(scene, goal=fits[0] if fits else (*place, tried[0])))
         return np.array(fits)
 
     @cached_property

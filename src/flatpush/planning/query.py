@@ -34,6 +34,7 @@ class Query:
     Attributes:
         fleet: the cars and what their motions and changes cost; an infinite cost forbids a change.
         start, goal: poses X_WO, shape (3,) [m, m, rad].
+        other_starts, other_goals: where a path may begin or end as well, shape (n, 3).
         world: bounds and obstacles.
         bodies: object and fingertips of each push; needed only in a world that is not empty, as what follows.
         backs: where the fingertips land, from where they push, in O, shape (k, 2) [m]: what lies between the
@@ -63,6 +64,8 @@ class Query:
     free: bool = False
     slack: Array = field(default_factory=lambda: np.zeros(3))
     robust: bool = False
+    other_starts: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    other_goals: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         for name in ("start", "goal"):
@@ -94,17 +97,36 @@ class Query:
         arrays.last[:] = [stands(arrays, a, self.goal) for a in range(self.fleet.size)]
         return arrays
 
+    def able(self, pose: Array) -> list[int]:
+        """The pushes whose fingers land or leave at a pose, clear of everything."""
+        from .obstacles.kernels import stands
+
+        return [a for a in range(self.fleet.size) if stands(self.arrays, a, pose)]
+
     @cached_property
     def first(self) -> list[int]:
         """The pushes that can begin: their fingers land at the start."""
-        from .obstacles.kernels import stands
-
-        return [a for a in range(self.fleet.size) if stands(self.arrays, a, self.start)]
+        return self.able(self.start)
 
     @cached_property
     def last(self) -> list[int]:
         """The pushes that can end: their fingers leave at the goal."""
         return [a for a, able in enumerate(self.arrays.last.tolist()) if able]
+
+    @cached_property
+    def roots(self) -> list[tuple[Array, list[int]]]:
+        """All poses where a path may begin, with the pushes that can begin there."""
+        return [(pose, self.able(pose)) for pose in (self.start, *self.other_starts)]
+
+    @cached_property
+    def aims(self) -> list[tuple[Array, QueryArrays]]:
+        """All poses where a path may end, with the arrays of a query that has this one as its goal."""
+        found = [(self.goal, self.arrays)]
+        for pose in self.other_goals:
+            last = np.zeros(self.fleet.size, np.bool_)
+            last[self.able(pose)] = True
+            found.append((pose, self.arrays._replace(goal=pose.copy(), last=last)))
+        return found
 
     @cached_property
     def extent(self) -> Box:
@@ -128,7 +150,14 @@ class Query:
             accelerations=fleet.accelerations[:, ::-1],
             switching=fleet.switching.T,
         )
-        return replace(self, fleet=back, start=self.goal, goal=self.start)
+        return replace(
+            self,
+            fleet=back,
+            start=self.goal,
+            goal=self.start,
+            other_starts=self.other_goals,
+            other_goals=self.other_starts,
+        )
 
 
 def _padded(points: np.ndarray, size: int) -> np.ndarray:

@@ -5,15 +5,17 @@ lattices find narrower ones, and what they find is made shorter by moves that ke
 Whether a motion keeps the clearance is decided exactly, between its ends included (geometry.collision).
 """
 
-from .endpoints import check_endpoints
-from .portfolio import Portfolio
+from .endpoints import TOUCHING, check_endpoints
+from .polish.polish import KNOT
 from .prune import pruned
 from .scene_query import careful, obstructions, query_of
-from .search import Search
+from .search import FINE_KNOT, Search
 from .widest_way import widest_way
 
 __all__ = [
-    "Portfolio",
+    "FINE_KNOT",
+    "KNOT",
+    "TOUCHING",
     "Search",
     "careful",
     "check_endpoints",

@@ -4,15 +4,19 @@ import numpy as np
 
 from ..path import NOTHING, Path, Piece, pieces_of
 from ..query import Query
+from .polish.polish import KNOT
 
-WORTH = 5e-4  # of the cost of the path, that each piece must save
 WINDOW = 7  # pieces that one word may replace
 SWEEPS = 6
 
 
-def pruned(query: Query, path: Path) -> Path:
-    """The same path with words instead of several pieces where they keep clear and cost hardly more."""
-    worth = WORTH * path.cost
+def pruned(query: Query, path: Path, knot: float = KNOT) -> Path:
+    """The same path with words instead of several pieces where they keep clear and cost hardly more.
+
+    Args:
+        knot: the part of the cost of the path that each piece must save.
+    """
+    worth = knot * path.cost
     for _ in range(SWEEPS):
         better = _swept(query, path, worth)
         if better is None:

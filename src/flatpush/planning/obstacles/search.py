@@ -1,6 +1,7 @@
 """An anytime search among obstacles: trees, then lattices from coarse to fine, and every path they find made better."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +21,10 @@ EXPANSIONS, MOVES = (
 )  # of a round: poses, divided by the number of pushes, and tries at a better path
 REPLANNED = 8  # moves that one counts as which is judged by replanning
 CHAINS = 5  # that are kept
+# Moves at last, and the part of the cost that a knot must then save; so often.
+FINE_KNOT = 1e-4
+FINISH, CYCLES = ((2000, 1e-5), (4000, FINE_KNOT)), 4
+GOALS = 4  # of several, to which trees are grown
 MOST = 1 << 20  # poses of a lattice; then the next begins
 ANGLES = (12, 1024)
 DRAWN = 2000  # edges of a tree, for figures
@@ -30,7 +35,6 @@ class Search:
 
     Attributes:
         best: the cheapest path so far, or None; cost: what it is judged by, infinite without one.
-        known: a cost that is known from elsewhere; dearer paths are of no interest.
         work: poses expanded and moves tried so far.
         nodes: poses of all lattices so far.
         finest: cell of the finest lattice so far [m].
@@ -41,7 +45,7 @@ class Search:
     def __init__(self, query: Query, seed: int) -> None:
         self.query = query
         self.best: Path | None = None
-        self.cost = self.known = np.inf
+        self.cost = np.inf
         self.work = 0
         self.nodes = 0
         self.finest = np.inf
@@ -94,15 +98,17 @@ class Search:
         from the start or from the goal, in turns. What they find is polished at once, and the best ways again and
         again.
         """
-        if not self.query.first or not self.query.last:
+        if not self.query.first or not any(arrays.last.any() for _, arrays in self.query.aims):
             return
-        trees = Trees(self.query, self._seed)
-        self.work, self.nodes = trees.work, trees.size
-        if trees.path is not None:
-            self._take(trees.path)
+        for goal in (self.query.goal, *self.query.other_goals[: GOALS - 1]):
+            trees = Trees(replace(self.query, goal=goal), self._seed)
+            self.work += trees.work
+            self.nodes += trees.size
+            if trees.path is not None:
+                self._take(trees.path)
+                yield self.best
+                self._add(trees.path)
             yield self.best
-            self._add(trees.path)
-        yield self.best
         reaches = [Reach(self.query)]
         self.closed, self.direct = not reaches[0].open, reaches[0].direct
         if self.closed:
@@ -151,7 +157,7 @@ class Search:
 
     @property
     def _limit(self) -> float:
-        return min(self.cost, self.known) * SLACK
+        return self.cost * SLACK
 
     def _advance(self, lattice: Lattice) -> Path | None:
         seen, expanded = lattice.size, lattice.expanded
@@ -185,6 +191,14 @@ class Search:
         self.chains = kept[:CHAINS]
         if self.chains and self.chains[0].cost < self.cost * (1 - 1e-12):
             self._take(self.chains[0].path)
+
+    def finish(self) -> Path | None:
+        """The best path after a last polish, in which a knot may save less."""
+        for moves, knot in CYCLES * FINISH if self.chains else ():
+            self.chains[0].improve(moves, knot)
+            self.work += moves
+        self._keep(self.chains)
+        return self.best
 
     def offer(self, path: Path) -> bool:
         """Takes a path from elsewhere if it keeps the clearance."""

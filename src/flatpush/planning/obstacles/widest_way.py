@@ -19,7 +19,8 @@ def widest_way(query: Query) -> tuple[float, float]:
     from .lattice.kernels import distances
 
     point, largest = largest_disc(query)
-    start, goal = (transform(X, point) for X in (query.start, query.goal))
+    start = transform(query.start, point)
+    goals = np.array([transform(X, point) for X in (query.goal, *query.other_goals)])
     box = query.extent
     size = np.array([box.xmax - box.xmin, box.ymax - box.ymin])
     cell = float(np.sqrt(np.prod(size) / CELLS))
@@ -27,7 +28,7 @@ def widest_way(query: Query) -> tuple[float, float]:
     i, j = np.clip(((start - box[:2]) / cell).astype(int), 0, [nx - 1, ny - 1])
 
     def through(radius: float) -> bool:
-        distance = distances(query.world.arrays, radius, box, cell, nx, ny, goal, query.clearance)
+        distance = distances(query.world.arrays, radius, box, cell, nx, ny, goals, query.clearance)
         return bool(np.isfinite(distance[j * nx + i]))
 
     low, high = 0.0, largest

@@ -86,9 +86,11 @@ class Rest(NamedTuple):
 
 @kernel()
 def distances(
-    W: WorldArrays, radius: float, box: Box, cell: float, nx: int, ny: int, goal: Array, need: float
+    W: WorldArrays, radius: float, box: Box, cell: float, nx: int, ny: int, goals: Array, need: float
 ) -> Array:
-    """Distances of the middle of a disc from a goal among the obstacles over a grid's cells, at least, (nx · ny,) [m].
+    """Distances of the middle of a disc from the nearest of some goals, shape (m, 2), at least, (nx · ny,) [m].
+
+    Among the obstacles, over a grid's cells.
 
     Eight neighbours; what a path through cells can be longer than a straight one is taken off. Cells count as free
     unless the disc, less half a cell's diagonal, overlaps something at their middle.
@@ -103,12 +105,14 @@ def distances(
             x, y = box.xmin + (i + 0.5) * cell, box.ymin + (j + 0.5) * cell
             out[j * nx + i] = math.inf
             open_[j * nx + i] = still_gap(W, disc, x, y, 1.0, 0.0, need, need) >= need
-    gi = min(max(int((goal[0] - box.xmin) / cell), 0), nx - 1)
-    gj = min(max(int((goal[1] - box.ymin) / cell), 0), ny - 1)
-    heap_key, heap_at = np.empty(8 * n + 1), np.empty(8 * n + 1, np.int64)
-    size = 1
-    heap_key[0], heap_at[0] = 0.0, gj * nx + gi
-    out[gj * nx + gi] = 0.0
+    heap_key, heap_at = np.empty(8 * n + len(goals)), np.empty(8 * n + len(goals), np.int64)
+    size = 0
+    for goal in goals:
+        gi = min(max(int((goal[0] - box.xmin) / cell), 0), nx - 1)
+        gj = min(max(int((goal[1] - box.ymin) / cell), 0), ny - 1)
+        heap_key[size], heap_at[size] = 0.0, gj * nx + gi
+        out[gj * nx + gi] = 0.0
+        size += 1
     while size > 0:
         key, at = heap_key[0], heap_at[0]
         size -= 1

@@ -1,6 +1,7 @@
 """One search on a lattice, in pieces, so that it can be watched and stopped."""
 
 from dataclasses import dataclass
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,19 +51,20 @@ class Reach:
         from .kernels import distances
 
         self.point, self.radius = largest_disc(query)
-        endpoints = np.array([transform(X, self.point) for X in (query.start, query.goal)])
+        start = transform(query.start, self.point)
+        goals = np.array([transform(X, self.point) for X in (query.goal, *query.other_goals)])
         box = query.extent
         size = np.array([box.xmax - box.xmin, box.ymax - box.ymin])
         cell = max(0.35 * self.radius, float(np.sqrt(np.prod(size) / GRID_CELLS)))
         self.nx, self.ny = (int(n) + 1 for n in size / cell)
         self.cell, self.corner = cell, np.array(box[:2])
         self.far = distances(
-            query.world.arrays, self.radius, box, cell, self.nx, self.ny, endpoints[1], query.clearance
+            query.world.arrays, self.radius, box, cell, self.nx, self.ny, goals, query.clearance
         )
-        at = np.clip(((endpoints[0] - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
+        at = np.clip(((start - self.corner) / cell).astype(int), 0, [self.nx - 1, self.ny - 1])
         way = float(self.far[at[1] * self.nx + at[0]])
         self.open = bool(np.isfinite(way))
-        self.direct = way <= DETOUR * float(np.hypot(*(endpoints[1] - endpoints[0]))) + 2 * cell
+        self.direct = way <= DETOUR * float(np.min(np.linalg.norm(goals - start, axis=1))) + 2 * cell
         rates = []
         for a in range(query.fleet.size):
             laws = np.where(np.isfinite(query.fleet.speeds[a]), query.fleet.speeds[a], 1.0)
@@ -86,13 +88,11 @@ class Lattice:
     Args:
         bound: only ways that cost less are of interest.
         rng: shifts the lattice.
-        pushes: what may be used first; by default all that land at the start.
     """
 
     def __init__(
-        self, query: Query, reach: Reach, level: Level, bound: float, rng: np.random.Generator,
-        pushes: list[int] | None = None,
-    ) -> None:  # fmt: skip
+        self, query: Query, reach: Reach, level: Level, bound: float, rng: np.random.Generator
+    ) -> None:
         from ....steering.six_words import WORD
         from .kernels import Queue, Steps
 
@@ -106,10 +106,11 @@ class Lattice:
             np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound, -1.0, -1.0]), np.zeros(1, WORD),
         )  # fmt: skip
         self.done = False
+        self._aims = cycle(query.aims)
         q = self.queue
-        for a in query.first if pushes is None else pushes:
+        for pose, a in ((pose, a) for pose, pushes in query.roots for a in pushes):
             n = self.size
-            q.nodes[n] = [*query.start, 0.0, -1.0, 0.0]
+            q.nodes[n] = [*pose, 0.0, -1.0, 0.0]
             q.links[n] = [-1, a, n]
             # A root has a place of its own in the table, under a code that no cell has.
             q.table[n] = [-2 - n, n]
@@ -127,15 +128,19 @@ class Lattice:
         return int(self.queue.counts[2])
 
     def advance(self, budget: int, bound: float) -> bool:
-        """Expands up to so many poses, for paths that cost less than a bound; True if a better one was found."""
+        """Expands up to so many poses, for paths that cost less than a bound; True if a better one was found.
+
+        Words are tried to one of the goals, with every call to the next.
+        """
         from .kernels import DONE, FULL, expand
 
         best = self.queue.best
         best[0] = before = min(best[0], bound)
         left = budget
+        goal, arrays = next(self._aims)
         while left > 0:
             expanded = self.expanded
-            status = expand(self.query.arrays, self.queue, self.steps, self.rest, self.query.goal, left)
+            status = expand(arrays, self.queue, self.steps, self.rest, goal, left)
             if status == FULL:
                 self._grow()
                 left -= self.expanded - expanded
@@ -162,7 +167,7 @@ class Lattice:
             pieces.append((int(q.links[node, 1]), int(letter), amount))
             node = int(q.links[node, 0])
         shot = pieces_of(int(q.best[2]), q.shot[0])
-        return Path.of(self.query.fleet, self.query.start, [*pieces[::-1], *shot])
+        return Path.of(self.query.fleet, q.nodes[node, :3].copy(), [*pieces[::-1], *shot])
 
     def edges(self, most: int) -> tuple[Array, Array]:
         """Some edges of the tree: (n, 4) rows (push, letter, amount, cost) and the poses (n, 3) where they begin."""

@@ -16,7 +16,6 @@ LONGEST_SHORTCUT = 48  # legs of a path that one word may replace at first
 TRIES = 3  # words of a push that are looked at for one that keeps clear
 SMALL, LARGE = 3e-5, 0.2  # shifts, in turning radii and radians
 GAIN = 1e-9  # of the cost, that a move must save
-KNOT = 5e-4  # of the cost, that a knot must save: every piece starts and ends at rest
 
 
 @inner
@@ -195,7 +194,7 @@ def _shift(
 
 
 @kernel()
-def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) -> int:
+def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int, worth: float) -> int:
     """Tries a number of moves; returns the number of legs that the chain then has.
 
     T.last is for where the chain ends; where that moves, it is renewed.
@@ -206,7 +205,7 @@ def polish(T: QueryArrays, legs: Legs, n: int, state: np.ndarray, moves: int) ->
     loose = (
         1 if T.slack[0] > 0.0 or T.slack[1] > 0.0 or T.slack[2] > 0.0 else 0
     )  # whether the last knot moves, too
-    knot = KNOT * cost
+    knot = worth * cost
     # What replanning costs more, or 0: a better chain may itself cost so much more, if replanning it costs less.
     spare = max(0.0, _worth(T, legs, n, buffer, off, here) - cost)
     cost += spare + knot * n

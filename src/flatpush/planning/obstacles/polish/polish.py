@@ -5,6 +5,7 @@ import numpy as np
 from ...path import Path, Piece, pieces_of
 from ...query import Query
 
+KNOT = 5e-4  # of the cost, that a knot must save: every piece starts and ends at rest
 KNOTS = 48  # of a path, of which the cheapest chain is made
 
 
@@ -36,12 +37,16 @@ class Chain:
         self.legs = int(thread(self._query_arrays, knots, arrived, given, len(legs), self._arrays))
         self.cost = float(worth(self._query_arrays, self._arrays, self.legs)) if self.legs else np.inf
 
-    def improve(self, moves: int) -> bool:
-        """Tries a number of moves; True if the path got cheaper."""
+    def improve(self, moves: int, knot: float = KNOT) -> bool:
+        """Tries a number of moves; True if the path got cheaper.
+
+        Args:
+            knot: the part of the cost that a knot must save.
+        """
         from .kernels import polish, worth
 
         before = self.cost
-        self.legs = int(polish(self._query_arrays, self._arrays, self.legs, self.state, moves))
+        self.legs = int(polish(self._query_arrays, self._arrays, self.legs, self.state, moves, knot))
         self.cost = float(worth(self._query_arrays, self._arrays, self.legs))
         return self.cost < before * (1 - 1e-12)
 
