@@ -93,8 +93,8 @@ class AmongObstacles:
                 self.progress(self.best, spent, search.nodes)
             if search.cost < known * (1 - BETTER):
                 known, since = search.cost, search.work
-            patience = (PATIENCE_FREE if self.scene.free_angle else PATIENCE) * planning.iterations
-            patience = np.inf if path is None else patience
+            tries = PATIENCE_FREE if self.scene.free_angle else PATIENCE
+            patience = np.inf if path is None else float(tries * planning.iterations)
             done = search.work >= WORK * planning.iterations or search.work - since >= patience
             self.stopped_by = "time_limit" if spent > planning.time_limit else "iterations" if done else ""
             done = bool(self.stopped_by)

@@ -181,8 +181,8 @@ def _first(values: Array) -> int:
 def stretches(outline: Outline) -> list[Stretch]:
     """Edges of an outline, joined where the corner between them is nearly smooth and the normal has not turned far."""
     if outline.is_circle:
-        names = ("east side", "north side", "west side", "south side")
-        return [Stretch(name, (0,), np.ones(1), k / 4 - 1 / 8) for k, name in enumerate(names)]
+        sides = ("east side", "north side", "west side", "south side")
+        return [Stretch(name, (0,), np.ones(1), k / 4 - 1 / 8) for k, name in enumerate(sides)]
     order = outline.order
     normals = outline.edge_normals[order]
     n = len(normals)
