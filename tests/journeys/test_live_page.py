@@ -18,6 +18,12 @@ pytest.importorskip("uvicorn", reason=extra("page"))
 pytest.importorskip("starlette", reason=extra("page"))
 
 DESK, TABLET = (1280, 720), (820, 1180)
+COLUMNS = "object,start_id,run_id,t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id"
+# A file of a name and a text, as a browser hands it over.
+DROP = (
+    "const data = new DataTransfer(); data.items.add(new File([arguments[1]], arguments[0]));"
+    "document.dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));"
+)
 
 
 @pytest.fixture
@@ -177,11 +183,7 @@ def test_a_drawing_is_dropped_and_the_link_brings_it_back(page):
     """The file arrives as a browser hands it over; the drop itself is made in the page."""
     drawing = '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="40mm" viewBox="0 0 60 40">'
     drawing += '<path d="M5 5H55V35Z"/></svg>'
-    drop = (
-        "const data = new DataTransfer(); data.items.add(new File([arguments[1]], arguments[0]));"
-        "document.dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));"
-    )
-    page.js(drop, "wedge.svg", drawing)
+    page.js(DROP, "wedge.svg", drawing)
     page.wait("flatpush.model.scene.object.name === 'wedge'")
     page.settle()
     assert page.scene["pushes"] == "auto"
@@ -190,7 +192,7 @@ def test_a_drawing_is_dropped_and_the_link_brings_it_back(page):
     page.wait("location.hash.length > 100")
     time.sleep(0.5)  # the link is written a moment after the last change
     link, scene = page.browser.current_url, page.scene
-    page.js(drop, "notes.pdf", "nothing")
+    page.js(DROP, "notes.pdf", "nothing")
     page.wait("!document.getElementById('banner').hidden")
     assert "no kind of file" in page.text("banner")
     assert page.scene == scene
@@ -482,9 +484,7 @@ def stored(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stored")
     plan = fp.plan(parse_scene(mapping_of(BLOCK)))
     plan.save(folder / "block.json")
-    rows = [
-        "object,start_id,run_id,t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id"
-    ]
+    rows = [COLUMNS]
     rows += [f"block,,,{k / 10},{-30 + k},3,0,{-58 + k},3,0,1" for k in range(31)]
     (folder / "run.csv").write_text("\n".join([*rows, "# ended: done", ""]), encoding="utf-8")
     with Served(str(folder / "run.csv"), "--scene", str(folder / "block.json"), "--port", "0") as found:
@@ -519,6 +519,20 @@ def test_a_stored_plan_and_a_recorded_run_are_shown_until_something_is_changed(r
     page.click("undo")
     page.settle()
     assert page.text("subtitle").endswith("stored and verified")
+
+
+def test_a_log_that_is_dropped_is_played_with_the_scene_that_is_shown(recording, stored):
+    page, rows = recording, [COLUMNS]
+    rows += [f"block,,,{k / 10},{-20 + 2 * k},-5,0.2,{-48 + 2 * k},-5,0,1" for k in range(11)]
+    page.js(DROP, "other.csv", "\n".join([*rows, "# ended: stopped", ""]))
+    page.wait("document.getElementById('recordingended').textContent === 'It ended: stopped.'")
+    assert page.js("return flatpush.player.state(0.5).object") == pytest.approx([-10, -5, 0.2])
+    assert page.js("return flatpush.player.duration") == pytest.approx(1.0)
+    page.js(DROP, "empty.csv", rows[0] + "\n")
+    page.wait("document.getElementById('banner').textContent.includes('empty.csv')")
+    assert page.js("return flatpush.player.duration") == pytest.approx(1.0)  # what was there stays
+    page.press("\ue00c")  # Escape: the plan again
+    assert page.js("return flatpush.player.duration") == pytest.approx(stored[0].duration, abs=1e-3)
 
 
 def test_the_object_is_shoved_in_mid_push_and_the_horizon_controller_lands_again(recording):
