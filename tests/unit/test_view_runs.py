@@ -120,8 +120,8 @@ def test_ends_far_off_are_counted_where_they_are_not_shown():
     assert "1 ends further off" in {t.text for t in draw_tube(runs).texts()}
 
 
-def made_run(modes=("path", "saturated")):
-    plan = make_plan(obstacles=([[0.2, -0.2], [0.3, -0.2], [0.3, 0.3], [0.2, 0.3]],))
+def made_run(modes=("path", "saturated"), obstacle=((0.2, -0.2), (0.3, -0.2), (0.3, 0.3), (0.2, 0.3))):
+    plan = make_plan(obstacles=([list(corner) for corner in obstacle],))
     push = plan.pushes[0]
     n = len(push.times)
     contacts = tuple("sticking" if k < n // 2 else "sliding_left" for k in range(n))
@@ -146,7 +146,21 @@ def test_a_run_under_feedback_shows_tolerance_contact_and_clearance():
     gaps = clearances(plan.scene, run.object)
     corners = transform(run.object[:, None], TRIANGLE[None])
     np.testing.assert_allclose(gaps, 0.2 - corners[..., 0].max(axis=1), atol=1e-12)
-    assert f"least clearance {1e3 * gaps.min():.1f} mm" in said
+    assert f"least {1e3 * gaps.min():.1f} mm" in said
+
+
+def test_names_at_a_low_figure_of_a_run_do_not_collide():
+    """The names of the two axes ran into each other and into "contact", and 0.04 mm of clearance read 0.0."""
+    plan, run = made_run()
+    right = transform(run.object[:, None], TRIANGLE[None])[..., 0].max() + 4e-5
+    plan, run = made_run(obstacle=((right, -0.2), (right + 0.8, -0.2), (right + 0.8, 0.1), (right, 0.1)))
+    texts = draw_track(plan, run).texts()
+    assert "least 0.04 mm" in {t.text for t in texts}
+    for k, one in enumerate(texts):
+        for other in texts[k + 1 :]:
+            apart = (one.box[0] >= other.box[2], one.box[2] <= other.box[0])
+            apart += (one.box[1] >= other.box[3], one.box[3] <= other.box[1])
+            assert any(apart), (one.text, other.text)
 
 
 def test_what_is_too_short_to_be_seen_is_not_in_the_legend():

@@ -20,6 +20,7 @@ from .picture import check_ending, save_picture
 from .table import MM, draw_endpoints, draw_object, draw_workspace, view_box, what_is_drawn, workspace_entries
 from .trace import trace_pushes
 
+HEAD = 8.0  # more room above the axes of the distance, for their name [pt]
 STRIP = 11.0  # height of a strip over time [pt]
 LEAST_SEEN = 1 / 800  # part of the time that is a quarter of a point in a strip
 MOST_SAMPLES = 400  # of the clearance
@@ -87,7 +88,7 @@ def draw_track(plan: Plan, run: ClosedLoopRun, subtitle: str = "") -> Drawing:
 
     right = left + wide + 16 + LEFT
     foot = top + height
-    _error(page, (right, top, PAGE - EDGE, foot - 2 * STRIP - 14), plan, run)
+    _error(page, (right, top + HEAD, PAGE - EDGE, foot - 2 * STRIP - 14), plan, run)
     step = float(run.times[1] - run.times[0]) if len(run.times) > 1 else 1.0
     span = (float(run.times[0]), float(run.times[-1]) + step)
     for k, (values, looks) in enumerate(((run.contacts, CONTACTS), (run.modes, None))):
@@ -147,16 +148,20 @@ def _error(page: Drawing, frame: Box, plan: Plan, run: ClosedLoopRun) -> None:
     foot = bottom - (0.4 * (bottom - top) if _has_clearance(plan.scene) else 0.0)
     most = 1.08 * max(float(near.max()), 1.3 * tolerance)
     panel = Panel(page, (left, top, right, foot), (span[0], 0.0, span[1], most), equal=False)
-    panel.axes("", f"off the {'goal' if _plans_anew(run) else 'reference'} [mm]", (False, True))
+    panel.axes("", "", (False, True))
+    # Names lie above their axes: upright ones are longer than the axes are high.
+    goal = "goal" if _plans_anew(run) else "reference"
+    page.add(d.Text(left, top - 4, f"distance from the {goal} [mm]", 8.5, SOFT), 20)
     if _has_clearance(plan.scene):
         some = np.unique(np.linspace(0, len(run.times) - 1, MOST_SAMPLES).astype(int))
         gap = MM * clearances(plan.scene, run.object[some])
         low, high = min(float(gap.min()), 0.0), 1.08 * max(float(gap.max()), 1.0)
         below = Panel(page, (left, foot + 20, right, bottom), (span[0], low, span[1], high), equal=False)
-        below.axes("", "clearance [mm]", (False, True))
+        below.axes("", "", (False, True))
         below.line(np.stack([run.times[some], gap], axis=1), CLEARANCE, 3)
-        least = f"least clearance {gap.min():.1f} mm"
-        page.add(d.Text(right, foot + 16, least, 7.5, palette.OBSTACLE, "end", halo=True), 20)
+        least = f"least {gap.min():.{2 if abs(gap.min()) < 1 else 1}f} mm".replace("-", "−")
+        page.add(d.Text(left, foot + 16, "clearance [mm]", 8.5, SOFT), 20)
+        page.add(d.Text(right, foot + 16, least, 7.5, palette.OBSTACLE, "end"), 20)
     panel.line(np.array([[span[0], tolerance], [span[1], tolerance]]), TOLERANCE, 4)
     panel.line(np.stack([run.times, near], axis=1), ACTUAL, 5)
 
