@@ -10,8 +10,8 @@ import flatpush as fp
 from flatpush.control import ARRIVED, Camera, SimulatedSensor
 from flatpush.control.horizon.controller import HorizonController
 from flatpush.control.horizon.landings import fleet_of_contacts
+from flatpush.control.horizon.push_path import PushPath
 from flatpush.control.horizon.surroundings import MARGINS
-from flatpush.control.horizon.way import Way
 from flatpush.control.loop.closed_loop import drive
 from flatpush.experiments.feedback import task
 from flatpush.experiments.feedback_among import attempt_among, crowded_task, least_room
@@ -50,7 +50,7 @@ def way_of(controller, pieces, start=(0.0, 0.0, 0.4)):
         for k, o in enumerate(controller.planner.usable)
     ]
     path = Path.of(fleet_of_contacts(cars, 0.03), np.array(start), pieces)
-    return Way.of(path, 0.003), cars[pieces[0][0]], path
+    return PushPath.of(path, 0.003), cars[pieces[0][0]], path
 
 
 def test_a_way_is_the_path_of_the_first_push():
@@ -69,7 +69,7 @@ def test_a_place_on_a_way_and_beside_it():
     controller = HorizonController.of(task(1).scene)
     way, car, _ = way_of(controller, [(0, 0, 0.7), (0, 1, 0.03)])
     m, k = car.model, 7
-    on = way.place(m, way.poses[k], 0)
+    on = way.progress(m, way.poses[k], 0)
     assert on.passed in (k - 1, k)
     assert on.left == pytest.approx(way.left[k], abs=1e-6)
     assert (on.off, on.skew) == pytest.approx((0, 0), abs=1e-6)
@@ -78,15 +78,15 @@ def test_a_place_on_a_way_and_beside_it():
     # Two millimetres to the left, and turned by a tenth to the left: both call for a turn to the right.
     heading = m.flat_of(way.poses[-5])[2]
     aside = way.poses[-5] + [-0.002 * np.sin(heading), 0.002 * np.cos(heading), 0.0]
-    there = way.place(m, aside, 0)
+    there = way.progress(m, aside, 0)
     assert there.off == pytest.approx(0.002, rel=1e-6)
     assert there.turn == pytest.approx(0, abs=1e-9)
     assert there.curvature(0.03) == pytest.approx(-((2 / 0.03) ** 2) * 0.002)
     turned = compose(way.poses[-5], exp(0.1 * np.array([m.flat_point[1], -m.flat_point[0], 1.0])))
-    assert way.place(m, turned, 0).skew == pytest.approx(0.1)
-    assert way.place(m, turned, 0).curvature(0.03) == pytest.approx(-4 / 0.03 * np.sin(0.1))
+    assert way.progress(m, turned, 0).skew == pytest.approx(0.1)
+    assert way.progress(m, turned, 0).curvature(0.03) == pytest.approx(-4 / 0.03 * np.sin(0.1))
     # Beyond its end nothing is left.
-    assert way.place(m, compose(way.poses[-1], [*(0.004 * m.direction), 0.0]), 0).left == pytest.approx(
+    assert way.progress(m, compose(way.poses[-1], [*(0.004 * m.direction), 0.0]), 0).left == pytest.approx(
         -0.004
     )
 
@@ -98,7 +98,7 @@ def test_the_law_comes_back_to_the_way():
     m, passed = car.model, 0
     car_, pose = replace(m, drift=None), way.poses[0] + [0.0, 0.003, 0.1]
     while True:
-        place = way.place(m, pose, passed)
+        place = way.progress(m, pose, passed)
         passed = place.passed
         if place.left <= 0:
             break
@@ -120,19 +120,20 @@ def test_the_way_of_the_next_push_keeps_the_clearance_and_the_most_room():
         for k, o in enumerate(controller.planner.usable)
     ]
     *_, found = controller.surroundings.next_push(cars, np.array(scene.start), np.zeros(3), 0.03, 0)
-    assert found.way.margin == MARGINS[0]
+    assert found.path.margin == MARGINS[0]
     place = controller.planner.usable[found.push].placement
     wall, corners = shapely.Polygon(WALL), scene.object.outline.vertices
-    tip = transform(found.way.poses, place.tips[0])
+    tip = transform(found.path.poses, place.tips[0])
     assert (
-        shapely.distance(wall, shapely.polygons(transform(found.way.poses[:, None], corners))).min() > 0.00299
+        shapely.distance(wall, shapely.polygons(transform(found.path.poses[:, None], corners))).min()
+        > 0.00299
     )
     assert shapely.distance(wall, shapely.points(tip)).min() - scene.pusher.tip_radius > 0.00299
     # Without the wall the way is another one, straight through where the wall stood.
     *_, open_ = HorizonController.of(among([])).surroundings.next_push(
         cars, np.array(scene.start), np.zeros(3), 0.03, 0
     )
-    assert shapely.distance(wall, shapely.polygons(transform(open_.way.poses[:, None], corners))).min() == 0
+    assert shapely.distance(wall, shapely.polygons(transform(open_.path.poses[:, None], corners))).min() == 0
 
 
 def test_less_room_is_kept_where_there_is_no_more():
@@ -145,7 +146,7 @@ def test_less_room_is_kept_where_there_is_no_more():
     gap = 0.0271 - 0.0175
     for pose, margin in (((-0.2, gap - 0.0025, 0.0), 0.002), ((-0.2, gap - 0.0007, 0.0), 0.0005)):
         *_, found = controller.surroundings.next_push(cars, np.array(pose), np.zeros(3), 0.03, 0)
-        assert found.way.margin == margin
+        assert found.path.margin == margin
     *_, why = controller.surroundings.next_push(
         cars, np.array((-0.2, gap - 0.0001, 0.0)), np.zeros(3), 0.03, 0
     )
@@ -262,7 +263,7 @@ def test_where_there_is_no_way_it_looks_again_and_says_why():
         HorizonController.of(scene), scene, 60.0, lambda time, state: times.append((time, state.stuck))
     )
     assert "stopped" in run.outcome
-    assert "no way" in run.outcome or "no push can" in run.outcome
+    assert "no path" in run.outcome or "no push can" in run.outcome
     assert max(stuck for _, stuck in times) == 2
     assert run.times[-1] < 5
     assert np.ptp(run.object, axis=0).max() == 0

@@ -102,7 +102,7 @@ def test_where_there_is_no_plan_it_looks_again_and_says_why():
     controller = ReplanningController.of(scene)
     run = run_of(controller, scene, Plant(scene.object, controller.limits.tips, scene.pusher.tip_radius))
     assert run.outcome.startswith("stopped, 199.9")
-    assert "no way" in run.outcome or "no push can" in run.outcome
+    assert "no path" in run.outcome or "no push can" in run.outcome
     assert np.ptp(run.object, axis=0).max() == 0
     assert run.times[-1] < 5
 

@@ -24,9 +24,9 @@ from .contact_car import ContactCar
 from .contact_observer import LOST, ContactObserver, nearest_contact
 from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
+from .push_path import PushPath
 from .state import HorizonState, LearningWindow
 from .surroundings import GUARD, Surroundings, Thoughts
-from .way import Way
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
 # friction that is a fifth less than believed.
@@ -48,9 +48,9 @@ RESUMES = 5
 # than this share of its half angle.
 FAILURES, LEEWAY = 3, 0.15
 # Among things the last stretch of the last push, so many radii long, is planned anew at every tick. Before it the
-# finger keeps to the way; a push ends that is off it by so many radii, or by so much of its heading [rad].
+# finger keeps to its path; a push ends that is off it by so many radii, or by so much of its heading [rad].
 LAST, ASTRAY, SKEWED = 1.5, 0.5, 0.7
-# So often it looks where no way is found, before it gives up.
+# So often it looks where no path is found, before it gives up.
 LOOKS = 3
 # Object and finger keep so far from the bounds, for what a prediction over the camera's latency may be off [m].
 ROOM = 0.002
@@ -76,7 +76,7 @@ class HorizonController(AbstractController[HorizonState]):
         sd: standard deviation of a frame's angle [rad], for learning.
         bounds: xmin, ymin, xmax, ymax [m]; a push ends before the object or the finger would leave them, and another is
             tried. Ways are planned without regard to them.
-        surroundings: what ways, landings and retreats keep clear of; None where nothing is in the way.
+        surroundings: what paths, landings and retreats keep clear of; None where nothing is in the way.
     """
 
     scene: Scene
@@ -125,7 +125,7 @@ class HorizonController(AbstractController[HorizonState]):
         """The controller for the scene of a plan: its object, goal and pushes.
 
         Args:
-            plan: a plan, or its scene; its own way does not matter, since it is planned anew from what is seen.
+            plan: a plan, or its scene; its own path does not matter, since it is planned anew from what is seen.
             latency: of the camera that is expected [s]; frames older than this and half a second, or than `stale` [s],
                 stop the pusher.
             rate, tolerance, landings, body: see the attributes.
@@ -241,8 +241,8 @@ class HorizonController(AbstractController[HorizonState]):
         cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         if self.surroundings is not None:
             seed = state.landings + LOOKS * state.stuck
-            ways = self.surroundings.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
-            thoughts: Thoughts[Landing | str] = Thoughts(ways)
+            search = self.surroundings.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
+            thoughts: Thoughts[Landing | str] = Thoughts(search)
             return self._think(replace(state, thoughts=thoughts, thought=0, note=text), thoughts, time)
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
@@ -266,7 +266,7 @@ class HorizonController(AbstractController[HorizonState]):
     def _think(
         self, state: HorizonState, thoughts: Thoughts[Landing | str], time: float
     ) -> tuple[HorizonState, Command]:
-        """A tick's part of the search for a way among things; then up, over and down to the push that was found.
+        """A tick's part of the search for a path among things; then up, over and down to the push that was found.
 
         It looks again, a few times, where there is none.
         """
@@ -281,8 +281,8 @@ class HorizonController(AbstractController[HorizonState]):
             return again, self._standing(state)
         place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
-        assert found.way is not None
-        pusher, pose = self.scene.pusher, found.way.poses[0]
+        assert found.path is not None
+        pusher, pose = self.scene.pusher, found.path.poses[0]
         contact = compose(pose, place.pose)
         contact[2] = hand[2] + pose_error(contact, hand)[2]
         before = compose(pose, compose(place.pose, [-pusher.approach, 0.0, 0.0]))
@@ -316,7 +316,7 @@ class HorizonController(AbstractController[HorizonState]):
             stops=tuple(stops),
             push=found.push,
             target=found.target,
-            way=found.way,
+            path=found.path,
             passed=0,
             stuck=0,
             frames=(pose,),
@@ -431,16 +431,16 @@ class HorizonController(AbstractController[HorizonState]):
         driven = self._driven(state, float(pose[2]), time)
         allowed = state.allowed - driven
         before = state.rest - driven
-        rest, place = None, None
-        if state.way is not None:
-            place = state.way.place(m, pose, state.passed)
-            if abs(place.off) > ASTRAY * car.radius or abs(place.skew) > SKEWED:
-                return self._retreat(state, time, f"{1000 * abs(place.off):.1f} mm off its way")
-            if not state.way.last or place.left > LAST * car.radius:
-                kappa = min(max(place.curvature(car.radius), -m.right), m.left)
-                rest = Rest(kappa, max(place.left, 0.0), "way" if place.left > 0 else "past")
-                before = place.left
-            state = replace(state, passed=place.passed)
+        rest: Rest | None = None
+        if state.path is not None:
+            progress = state.path.progress(m, pose, state.passed)
+            if abs(progress.off) > ASTRAY * car.radius or abs(progress.skew) > SKEWED:
+                return self._retreat(state, time, f"{1000 * abs(progress.off):.1f} mm off its path")
+            if not state.path.last or progress.left > LAST * car.radius:
+                kappa = min(max(progress.curvature(car.radius), -m.right), m.left)
+                rest = Rest(kappa, max(progress.left, 0.0), "path" if progress.left > 0 else "past")
+                before = progress.left
+            state = replace(state, passed=progress.passed)
         if rest is None:
             rest = rest_of_path(
                 flat,
@@ -467,7 +467,7 @@ class HorizonController(AbstractController[HorizonState]):
         if self._leaves(m, pose, self.hand(state, time), velocity):
             ended = replace(self._failed(state), stopped=state.stopped + 1)
             return self._retreat(ended, time, "the push would leave the bounds")
-        if state.way is not None and not self._free(state, state.way, pose, speed, omega):
+        if state.path is not None and not self._free(state, state.path, pose, speed, omega):
             ended = replace(state, stopped=state.stopped + 1)
             return self._retreat(ended, time, "the push would come too near to something")
         window = state.window
@@ -477,20 +477,20 @@ class HorizonController(AbstractController[HorizonState]):
             state,
             mode="push",
             note=rest.how,
-            rest=before if rest.how == "way" else rest.due(before),
+            rest=before if rest.how == "path" else rest.due(before),
             allowed=allowed,
             window=window,
             expected=pose,
         ), Command(velocity)
 
-    def _free(self, state: HorizonState, way: Way, pose: Array, speed: float, omega: float) -> bool:
+    def _free(self, state: HorizonState, path: PushPath, pose: Array, speed: float, omega: float) -> bool:
         """Whether object and finger stay clear until a hand comes to rest that goes on from X_WO like this."""
         assert state.car is not None
         assert state.tip is not None
         assert self.surroundings is not None
         rests = 1 / self.rate + 0.5 * speed / (BRAKE * self.scene.pusher.acceleration)
         twist = rests * state.car.model.twist(speed, omega)
-        return self.surroundings.free(state.tip[None], pose, twist, GUARD * way.margin)
+        return self.surroundings.free(state.tip[None], pose, twist, GUARD * path.margin)
 
     def _driven(self, state: HorizonState, turn: float, time: float) -> float:
         """How far the flat point has come in the last tick [m]."""

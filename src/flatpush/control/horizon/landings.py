@@ -1,4 +1,4 @@
-"""Where to land next: the first push of the best way of many pushes, with the cars as they are known now."""
+"""Where to land next: the first push of the best path of many pushes, with the cars as they are known now."""
 
 from collections.abc import Sequence
 from itertools import islice
@@ -11,16 +11,16 @@ from ...planning.path import Path
 from ...planning.query import Query
 from ...steering.fleet import Fleet
 from .contact_car import ContactCar
-from .way import Way
+from .push_path import PushPath
 
 
 class Landing(NamedTuple):
-    """The push to begin with, X_WO where it shall end, and the length of its flat path [m]; among things, its way."""
+    """The push to begin with, X_WO where it shall end, and the length of its flat path [m]; among things, its path."""
 
     push: int
     target: Array
     length: float
-    way: Way | None = None
+    path: PushPath | None = None
 
 
 def next_push(
@@ -39,8 +39,8 @@ def next_push(
     fleet = fleet_of_contacts([car for car in cars if car is not None], switching)
     query = Query(fleet, pose, np.nan_to_num(goal), free=bool(np.isnan(goal[2])))
     path = free_path(query, seed)
-    way = Way.of(path, 0.0)
-    return Landing(usable[path.pushes[0]], way.poses[-1], float(way.left[0]))
+    first = PushPath.of(path, 0.0)
+    return Landing(usable[path.pushes[0]], first.poses[-1], float(first.left[0]))
 
 
 def free_path(query: Query, seed: int) -> Path:

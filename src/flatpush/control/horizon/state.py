@@ -11,7 +11,7 @@ from ..loop.controller import ControllerState
 from ..loop.measurement import Measurement
 from .contact_car import ContactCar
 from .push_knowledge import Steering
-from .way import Way
+from .push_path import PushPath
 
 if TYPE_CHECKING:
     from .landings import Landing
@@ -54,9 +54,9 @@ class HorizonState(ControllerState):
             and its gap to the edge [m].
         car: of the contact now; landed: the radius of that where it landed. rest: of the push [m];
             allowed: it ends after this at the latest [m].
-        way, passed: of the push among things, and the number of its pose that was passed.
+        path, passed: of the push among things, and the number of its pose that was passed.
         thoughts, thought: of where to land next among things, and how many parts of that are done.
-        stuck: how often no way was found since the last.
+        stuck: how often no path was found since the last.
         landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
             object or the finger would have left the bounds.
         failures: how often the finger slipped, or lost the edge too often, at every option. forgiven: whether they were
@@ -78,7 +78,7 @@ class HorizonState(ControllerState):
     landed: float = np.inf
     rest: float = np.inf
     allowed: float = np.inf
-    way: Way | None = None
+    path: PushPath | None = None
     passed: int = 0
     thoughts: "Thoughts[Landing | str] | None" = None
     thought: int = 0

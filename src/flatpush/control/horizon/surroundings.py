@@ -1,4 +1,4 @@
-"""What object and finger keep clear of: ways for the next push among it, and whether a motion is free."""
+"""What object and finger keep clear of: paths for the next push among it, and whether a motion is free."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ from ...problem import Scene
 from ...steering.fleet import Fleet
 from .contact_car import ContactCar
 from .landings import Landing, fleet_of_contacts, free_path
-from .way import Way
+from .push_path import PushPath
 
 # Ways keep so much more than the scene's clearance, for noise, latency and another table; or less if there is none [m].
 MARGINS = (0.003, 0.002, 0.001, 0.0005)
-# A push stops before it comes nearer than this share of the margin of its way.
+# A push stops before it comes nearer than this share of the margin of its path.
 GUARD = 0.4
-# Rounds of the search without a way, and after the first.
+# Rounds of the search without a path, and after the first.
 ROUNDS, BETTER = 40, 6
 # Back from the object the finger goes by the first of these shares of the approach that is free.
 BACK = (1.0, 0.5, 0.25)
@@ -82,7 +82,7 @@ class Surroundings:
     def next_push(
         self, cars: Sequence[ContactCar | None], pose: Array, goal: Array, switching: float, seed: int
     ) -> Iterator[Landing | str | None]:
-        """Where one finger lands next with an object at X_WO, and the way of that push; or why there is none.
+        """Where one finger lands next with an object at X_WO, and the path of that push; or why there is none.
 
         Args:
             cars: of the options; None where one is left out. goal: X_WO. switching, seed: see landings.next_push.
@@ -95,14 +95,14 @@ class Surroundings:
             yield "no push can be steered"
             return
         fleet = fleet_of_contacts([car for _, car in known], switching)
-        for found in self.ways(fleet, [self.options[k] for k, _ in known], pose, goal, seed):
+        for found in self.paths(fleet, [self.options[k] for k, _ in known], pose, goal, seed):
             if isinstance(found, RoomyPath):
-                way = Way.of(found.path, found.margin)
-                yield Landing(known[found.path.pushes[0]][0], way.poses[-1], float(way.left[0]), way)
+                first = PushPath.of(found.path, found.margin)
+                yield Landing(known[found.path.pushes[0]][0], first.poses[-1], float(first.left[0]), first)
             else:
                 yield found
 
-    def ways(
+    def paths(
         self, fleet: Fleet, options: Sequence[PushOption], pose: Array, goal: Array, seed: int
     ) -> Iterator[RoomyPath | str | None]:
         """Of the paths from X_WO with the most room to spare the cheapest that is found, as next_push.
@@ -141,7 +141,7 @@ class Surroundings:
             if search.best is not None:
                 yield RoomyPath(search.best, margin)
                 return
-            complaint = f"no way with {1000 * asked.clearance:.2f} mm of clearance was found from here"
+            complaint = f"no path with {1000 * asked.clearance:.2f} mm of clearance was found from here"
         yield complaint
 
     def free(self, tips: Array, pose: Array, twist: Array, margin: float) -> bool:

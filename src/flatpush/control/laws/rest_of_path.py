@@ -10,9 +10,9 @@ from .formulas import wrapped
 
 #: "even": two arcs, none tighter than with the reserve; "planned": a Dubins path with the reserve; "tight": one with
 #: the widest turns that lead there, as far as feedback may use them; "closing": none leads there without a loop, and
-#: what is left of the errors is spread by two arcs or, near the end, by the turn after which least is missed; "way":
-#: along a way that was found among things; "past": the end is abeam or behind, or the planned length is used up.
-How = Literal["even", "planned", "tight", "closing", "way", "past"]
+#: what is left of the errors is spread by two arcs or, near the end, by the turn after which least is missed; "path":
+#: along a path that was found among things; "past": the end is abeam or behind, or the planned length is used up.
+How = Literal["even", "planned", "tight", "closing", "path", "past"]
 
 # A rest longer than what should be left by more than this is another path: a loop [radii].
 LONGER = 0.15

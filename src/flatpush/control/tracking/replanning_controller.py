@@ -184,14 +184,14 @@ class ReplanningController(AbstractController[ReplanningState]):
         """In parts, the path from X_WO to the goal, and the margin that it keeps; or why there is none."""
         goal, fleet = self.scene.goal_pose, self.planner.fleet
         if self.surroundings is not None:
-            return self.surroundings.ways(fleet, self.planner.usable, pose, goal, seed)
+            return self.surroundings.paths(fleet, self.planner.usable, pose, goal, seed)
         query = Query(fleet, pose, np.nan_to_num(goal), free=bool(np.isnan(goal[2])))
         return iter([RoomyPath(free_path(query, seed), 0.0)])
 
     def _think(
         self, state: ReplanningState, thoughts: Thoughts[RoomyPath | str], time: float
     ) -> tuple[ReplanningState, Command]:
-        """A tick's part of the search for a way; then to the first push of what was found.
+        """A tick's part of the search for a path; then to the first push of what was found.
 
         It looks again, a few times, where there is none.
         """

@@ -1,4 +1,4 @@
-"""The way of an object through one push, as it was found among things, and the law that keeps to it."""
+"""The path of an object through one push, as it was found among things, and the law that keeps to it."""
 
 import math
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from ...planning.path import Path
 from ..laws.formulas import wrapped
 from ..laws.steering_model import SteeringModel
 
-# Between the poses that are kept of a way, along the path of the flat point [m].
+# Between the poses that are kept of a path, along the path of the flat point [m].
 STEP = 0.001
-# Both poles of the law that keeps to a way, by the turning radius: an error is gone after about one radius.
+# Both poles of the law that keeps to a path, by the turning radius: an error is gone after about one radius.
 POLE = 2.0
 
 
-class Place(NamedTuple):
-    """Where an object is on its way: the pose it has passed, what is left of the way [m], how far it is off to the left
-    [m], the angle off its heading [rad], and the turn of the way there [1/m]."""
+class Progress(NamedTuple):
+    """Where an object is on its path: the pose it has passed, what is left of the path [m], how far it is off to the
+    left [m], the angle off its heading [rad], and the turn of the path there [1/m]."""
 
     passed: int
     left: float
@@ -29,7 +29,7 @@ class Place(NamedTuple):
     turn: float
 
     def curvature(self, radius: float) -> float:
-        """The turn per length that leads back to the way [1/m]: in arc length e'' + 2 p e' + p² e = 0.
+        """The turn per length that leads back to the path [1/m]: in arc length e'' + 2 p e' + p² e = 0.
 
         Args:
             radius: by which it comes back [m].
@@ -40,7 +40,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class PushPath:
     """Poses of the object along one push.
 
     Attributes:
@@ -55,7 +55,7 @@ class Way:
     last: bool
 
     @classmethod
-    def of(cls, path: Path, margin: float) -> "Way":
+    def of(cls, path: Path, margin: float) -> "PushPath":
         """The first push of a path."""
         push, poses, steps = path.pieces[0][0], [path.start[None]], [np.zeros(0)]
         for k, (which, letter, amount) in enumerate(path.pieces):
@@ -69,8 +69,8 @@ class Way:
         along = np.concatenate([[0.0], np.cumsum(np.concatenate(steps))])
         return cls(np.concatenate(poses), along[-1] - along, margin, len(path.pushes) == 1)
 
-    def place(self, model: SteeringModel, pose: Array, passed: int) -> Place:
-        """Of an object at X_WO that had passed a pose of the way before."""
+    def progress(self, model: SteeringModel, pose: Array, passed: int) -> Progress:
+        """Of an object at X_WO that had passed a pose of the path before."""
         x, y, heading = model.flat_of(pose)
         most = len(self.poses) - 2
         k = min(passed, most)
@@ -85,7 +85,7 @@ class Way:
             k += 1
         bent = wrapped(end - begin)
         share = min(max(on / length, 0.0), 1.0)
-        return Place(
+        return Progress(
             k,
             float(self.left[k]) - on,
             tx * (y - ay) - ty * (x - ax),
