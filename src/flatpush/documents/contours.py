@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.pose import Array
 from .drawing import FLATNESS, Curve, Drawing, LeftOut, extent
+from .ends import gap_refusal, joints
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -67,16 +68,19 @@ def outer_contour(drawing: Drawing, source: str, choice: str = "") -> tuple[Arra
             "the drawing has no extent", source=source, hint="Its coordinates are finite numbers."
         )
     closed, opened = _filled(*_joined(pieces, source))
+
+    def gap(rule: str, chains: list[Chain]) -> InputError:
+        used = {id(curve) for curve in curves}
+        others = [
+            replace(c, aside=c.aside or f"not on {choice}") for c in drawing.curves if id(c) not in used
+        ]
+        lines = [(chain.parts[0][0], chain.points) for chain in chains]
+        return gap_refusal(lines, [*others, *drawing.hidden], drawing.unit, rule, source)
+
     if not closed:
-        end = opened[0].points[-1]
-        raise InputError(
-            f"a line of the drawing is not closed: it ends at [{end[0]:.6g}, {end[1]:.6g}]",
-            source=source,
-            value=opened[0].place,
-            hint=f"{_ONE}.",
-        )
+        raise gap("a line of the drawing is not closed", opened)
     outer = max(closed, key=lambda chain: float(np.prod(np.ptp(chain.points, axis=0))))
-    _check_alone(outer, closed, opened, source)
+    _check_alone(outer, closed, opened, source, gap)
     _check_no_frame(outer, [chain for chain in closed if chain is not outer], source, choice)
     if flaw := next((curve for curve, _ in outer.parts if curve.refusal), None):
         raise InputError(f"{flaw.place}: {flaw.refusal}", source=source, hint=_REDRAW)
@@ -210,7 +214,7 @@ def _linked(
     pieces = _once([p for p in pieces if extent(p[1]) > tolerance], tolerance)
     if not pieces:
         return [], []
-    ends = _nodes(np.array([(points[0], points[-1]) for _, points in pieces]).reshape(-1, 2), tolerance)
+    ends = joints(np.array([(points[0], points[-1]) for _, points in pieces]).reshape(-1, 2), tolerance)
     at: dict[int, list[int]] = {}  # node: the pieces that end there
     for k, (u, v) in enumerate(ends):
         at.setdefault(u, []).append(k)
@@ -255,19 +259,6 @@ def _linked(
     return closed, opened
 
 
-def _nodes(points: Array, tolerance: float) -> list[tuple[int, int]]:
-    """Numbers of the clusters that the ends of each piece belong to, from the ends (2 n, 2)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    near = near.astype(np.int32)  # scipy 1.11 walks through no others
-    links = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
-    labels = connected_components(links, directed=False)[1].reshape(-1, 2)
-    return [(int(u), int(v)) for u, v in labels]
-
-
 def _once(pieces: list[tuple[Curve, Array]], tolerance: float) -> list[tuple[Curve, Array]]:
     """The pieces without those that are drawn twice, in either sense."""
     if len(pieces) < 2:
@@ -298,8 +289,14 @@ def _traced(parts: Sequence[tuple[Curve, bool]], points: Callable[[Curve], Array
     return np.concatenate([*whole, whole[0][:1]])
 
 
-def _check_alone(outer: Chain, closed: list[Chain], opened: list[Chain], source: str) -> None:
-    """Refuses contours outside the outer one, and open lines that may be the true outline."""
+def _check_alone(
+    outer: Chain,
+    closed: list[Chain],
+    opened: list[Chain],
+    source: str,
+    gap: Callable[[str, list[Chain]], InputError],
+) -> None:
+    """Refuses contours outside the outer one, and open lines that may be the true outline; gap: says where it is."""
     from shapely import LineString, Polygon, box
     from shapely.geometry import MultiPoint
 
@@ -328,13 +325,8 @@ def _check_alone(outer: Chain, closed: list[Chain], opened: list[Chain], source:
         known = np.concatenate([chain.points, apart.get(layer, chain.points[:1])])
         apart[layer] = np.array([known.min(axis=0), known.max(axis=0)])
         if surrounds or box(*apart[layer].ravel()).covers(shell):
-            end = chain.points[-1]
-            raise InputError(
-                f"lines around the only closed contour are not closed; one ends at [{end[0]:.6g}, {end[1]:.6g}]",
-                source=source,
-                value=chain.place,
-                hint=f"{_ONE}, {_CHOOSE}",
-            )
+            around_it = [c for c in opened if c.parts[0][0].layer == layer]
+            raise gap("lines around the only closed contour are not closed", around_it)
 
 
 def _check_no_frame(outer: Chain, others: list[Chain], source: str, choice: str) -> None:

@@ -67,6 +67,7 @@ class Drawing:
     Attributes:
         unit: length of its unit [m]; None if it declares none.
         known: names of layers and objects that can be chosen, those of hidden ones too.
+        hidden: curves that are not seen, with the reason in `aside`: an outline with a gap may lack one of them.
     """
 
     unit: float | None = None
@@ -74,6 +75,7 @@ class Drawing:
     left_out: list[LeftOut] = field(default_factory=list)
     unreadable: list[Unreadable] = field(default_factory=list)
     known: dict[str, None] = field(default_factory=dict)
+    hidden: list[Curve] = field(default_factory=list)
 
 
 def extent(points: Array) -> float:

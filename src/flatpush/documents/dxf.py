@@ -131,6 +131,8 @@ class _Reader:
         names = (layer, *blocks)
         if reason := self.unseen(entity, layer, frozen_only=kind == "INSERT"):
             self.drawing.left_out.append(LeftOut(place, reason))
+            if kind in _LINES and (unseen := _if_readable(entity)) is not None:
+                self.drawing.hidden.append(Curve(unseen, place, layer, names, reason))
         elif kind == "INSERT":
             self.insert(entity, layer, blocks, level, place)
         elif kind == "MLINE":
@@ -247,6 +249,14 @@ def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
         return np.array([(p.x, p.y) for p in path.flattening(max(distance, FLATNESS**2 * size), segments=4)])
 
     return points
+
+
+def _if_readable(entity: "DXFEntity") -> Callable[[float], Array] | None:
+    """The same for what is not seen: it need not be readable."""
+    try:
+        return _points(entity)
+    except Exception:  # a broken file can make ezdxf stumble anywhere
+        return None
 
 
 def _unclamped(spline: "DXFEntity") -> Callable[[float], Array] | None:

@@ -162,6 +162,7 @@ class _Reader:
             return
         if state.hidden:
             self.left_out(element, state.hidden)
+            self.remember(element, state)
             return
         try:
             if tag in SHAPES:
@@ -322,7 +323,9 @@ class _Reader:
     def shape(self, element: Element, state: _State) -> None:
         style = state.style
         if style.get("visibility", "").lower() in ("hidden", "collapse"):
-            self.left_out(element, f"hidden (visibility: {style['visibility']})")
+            reason = f"hidden (visibility: {style['visibility']})"
+            self.left_out(element, reason)
+            self.remember(element, replace(state, hidden=reason))
             return
         filled = _painted(style, "fill", "black")
         stroked = _painted(style, "stroke", "none") and _width(style.get("stroke-width", "1")) > 0
@@ -380,6 +383,21 @@ class _Reader:
         for child in element.children:  # so that what is hidden is known by name
             names = (child.attributes.get(key, "") for key in ("id", "inkscape:label"))
             self.drawing.known.update(dict.fromkeys(name for name in names if name))
+
+    def remember(self, element: Element, state: _State) -> None:
+        """Keeps the curves of what is hidden, as far as they can be read."""
+        try:
+            for segments in Sizes().segments(element, state) if element.tag in SHAPES else ():
+                points = traced([s.moved(upright(state.matrix)) for s in segments])
+                self.drawing.hidden.append(
+                    Curve(points, element.place, state.layer, state.names, state.hidden)
+                )
+            for child in element.children if element.tag in _CONTAINERS else ():
+                if child.tag in (*_CONTAINERS, *SHAPES):
+                    style = style_of(child, self.rules, state.style)
+                    self.remember(child, self.inside(child, state, style, False))
+        except (Unsupported, ValueError):
+            return
 
     def unreadable(self, element: Element, state: _State, reason: str) -> None:
         names = (element.attributes.get(key, "") for key in ("id", "inkscape:label"))
