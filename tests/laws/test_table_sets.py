@@ -1,15 +1,18 @@
 """The proof for a set of tables against linear programs, drawn loads, and the plant."""
 
+import re
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 import flatpush as fp
-from flatpush.contact import WrenchCone
+from flatpush.contact import WrenchCone, narrowed
 from flatpush.contact.cone_twists import cone_twists
-from flatpush.contact.table_set import TableSet, set_twists
+from flatpush.contact.proved_twists import Bounds, NothingProved, proved_twists
+from flatpush.contact.table_set import WIDE, TableSet, set_twists, shifted
 from flatpush.friction.patches import patches
 from flatpush.geometry import perpendicular
 
@@ -249,3 +252,96 @@ def test_turning_radii_of_a_rectangle(name, radii):
         found.append(500 * np.linalg.norm(perpendicular(left[:2]) + perpendicular(right[:2])))
     assert np.all(np.array(found) <= 1.03 * np.array(radii))
     assert np.all(np.diff(found) > 0)
+
+
+def refused(bounds, name="feet", beside=0.0):
+    """What is said where nothing is proved, and the values up to which a car remains, by the bound.
+
+    Fingers whose span has the centre of friction beside it need friction to push straight.
+    """
+    support = SUPPORTS[name].centred()
+    contacts = [replace(c, point=c.point + np.array([beside, 0.0])) for c in fingers()]
+    nominal = cone_twists(contacts, fp.Exact(support), 0.2, np.zeros((1, 2)))
+    with pytest.raises(NothingProved) as raised:
+        proved_twists(support, contacts, 0.2, nominal, bounds)
+    text = str(raised.value)
+    values = {
+        key: unit * float(found[1])
+        for key, unit, pattern in (
+            ("loads", 0.01, r"loads within ([\d.]+) % instead"),
+            ("friction", 1.0, r"friction from ([\d.]+) instead"),
+            ("offset", 0.001, r"an offset up to ([\d.]+) mm instead"),
+        )
+        if (found := re.search(pattern, text))
+    }
+    return text, values, support, contacts, nominal
+
+
+def least_depth(twists, support, contacts, bounds):
+    """The least depth of twists (n, 3) over the vertices of the loads of feet and the ends of the offset, (n,)."""
+    cones = [
+        narrowed(pair, 0.2)
+        for pair in shifted([replace(c, friction=bounds.friction) for c in contacts], bounds.offset)
+    ]
+    feet = TableSet.of(support, 0.0)
+    tables = [
+        fp.Support.points(feet.points, vertex(feet.weights, bounds.loads, np.array(order)))
+        for order in permutations(range(len(feet.weights)))
+    ]
+    return np.min([cone.depth(table.wrench(twists)) for table in tables for cone in cones], axis=0)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "beside", "named"),
+    [
+        (Bounds(0.4, 0.2, 0.003), 0.0, {"loads", "offset"}),
+        (Bounds(0.6, 0.3, 0.0), 0.0, {"loads"}),
+        (Bounds(0.0, 0.2, 0.009), 0.0, {"offset"}),
+        (Bounds(0.02, 0.1, 0.0), 0.009, {"friction"}),
+    ],
+)
+def test_a_refusal_names_the_bound_that_breaks_it_and_how_far_it_may_go(bounds, beside, named):
+    """Against the vertices of the loads: a car at the value that is said, and one figure beyond it none, as some table
+    slips in all straight motions, or in all turns to one side as wide as any that is looked at."""
+    _, values, support, contacts, nominal = refused(bounds, beside=beside)
+    assert set(values) == named
+    ways = np.deg2rad(np.linspace(-30, 30, 601)) + np.pi / 2
+    turns = np.array([-1.0, 0.0, 1.0])[:, None] / (WIDE * support.radius)
+    motions = np.stack(np.broadcast_arrays(np.cos(ways), np.sin(ways), turns), axis=-1)
+    for key, value in values.items():
+        good = replace(bounds, **{key: value})
+        car = proved_twists(support, contacts, 0.2, nominal, good)
+        assert np.min(least_depth(car, support, contacts, good)) >= -1e-9
+        figure = 10.0 ** (np.floor(np.log10(value * (1 + 1e-9))) - 1)
+        beyond = replace(bounds, **{key: value - figure if key == "friction" else value + figure})
+        kept = least_depth(motions.reshape(-1, 3), support, contacts, beyond).reshape(3, -1) >= 0
+        assert not np.all(np.any(kept, axis=1))
+
+
+def test_a_refusal_says_where_bounds_break_it_together():
+    text, values, support, contacts, nominal = refused(Bounds(0.6, 0.3, 0.009))
+    assert not values
+    assert "loads and offset break it together" in text
+    proved_twists(support, contacts, 0.2, nominal, Bounds(0.0, 0.3, 0.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "bounds"),
+    [
+        ("face", Bounds(0.4, 0.2, 0.003)),
+        ("rim", Bounds(0.4, 0.3, 0.003)),
+        ("face", Bounds(0.2, 0.0001, 0.0)),
+        ("ring", Bounds(0.5, 0.2, 0.004)),
+    ],
+)
+def test_bounds_that_a_refusal_names_are_those_at_which_cars_end(name, bounds):
+    """Of spread pressure, against the whole search for a car on either side of what is said."""
+    _, values, support, contacts, nominal = refused(bounds, name)
+    assert values
+    for key, value in values.items():
+        proved_twists(support, contacts, 0.2, nominal, replace(bounds, **{key: value}))
+        figure = 10.0 ** (np.floor(np.log10(value * (1 + 1e-9))) - 1)
+        beyond = value - figure if key == "friction" else value + figure
+        with pytest.raises(NothingProved):
+            proved_twists(support, contacts, 0.2, nominal, replace(bounds, **{key: beyond}))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flatpush as fp
+from flatpush.contact import proved_twists
 from flatpush.documents import load_plan
 from flatpush.documents.scene_reader import parse_scene
 from flatpush.errors import InputError
@@ -101,6 +102,21 @@ def test_pushes_sought_for_the_set_are_not_taken_for_the_nominal_table():
     nominal = replace(scene, planning=replace(scene.planning, proof="nominal"))
     assert not fp.Planner(scene).usable
     assert len(fp.Planner(nominal).usable) == 4
+
+
+def test_a_refused_push_names_what_breaks_its_proof_only_where_that_is_read(monkeypatch):
+    """What breaks a proof takes a search, which no plan by another push should wait for."""
+    scene = parse_scene(changed(loads=0.5, offset=8.0))
+    asked, search = [], proved_twists._broken
+    monkeypatch.setattr(proved_twists, "_broken", lambda *given: asked.append(given) or search(*given))
+    refused = fp.Planner(scene).options[0]
+    assert refused.car is None
+    assert not asked
+    assert "a car remains with an offset up to" in refused.refusal
+    assert len(asked) == 1
+    plan = fp.plan(scene)
+    assert plan.status == "no_plan"
+    assert refused.refusal in plan.reason
 
 
 def test_one_finger_is_refused_with_what_would_do():

@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..contact.placement import SMOOTH_CORNER
+from ..errors import FlatpushError
 from ..friction import Support
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
@@ -113,7 +114,9 @@ def _automatic_pushes(scene: Scene) -> Found:
         (refused if option.car is None else found).append(option)
     kept = _spread(found)
     refused += [
-        replace(o, car=None, refusal="left out: other pushes in nearly this direction turn tighter")
+        replace(
+            o, car=None, error=FlatpushError("left out: other pushes in nearly this direction turn tighter")
+        )
         for o in found
         if o not in kept
     ]
@@ -318,5 +321,5 @@ def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
                     break
         order = grid[np.argsort(radii, kind="stable")]
         return _proved(scene, [tried[centre], *(tried[f] for f in order.tolist() if f in tried)])
-    reasons = [o for o in tried.values() if o.refusal]
+    reasons = [o for o in tried.values() if o.car is None]
     return reasons[0] if reasons else None

@@ -27,12 +27,17 @@ SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PushOption:
-    """A push and its car; without a car, `refusal` says why."""
+    """A push and its car, or the error that says why it has none."""
 
     push: Push
     placement: Placement | None
     car: Car | None
-    refusal: str = ""
+    error: FlatpushError | None = None
+
+    @property
+    def refusal(self) -> str:
+        """Why there is no car; empty where there is one. To name what breaks a proof takes time, once it is read."""
+        return "" if self.error is None else str(self.error)
 
 
 def push_option(
@@ -70,7 +75,7 @@ def push_option(
         )
         _check_composite(scene, placement, car, model or scene.planning.model)
     except FlatpushError as error:
-        return PushOption(push, placement, None, str(error))
+        return PushOption(push, placement, None, error.with_traceback(None))
     return PushOption(push, placement, car)
 
 

@@ -139,7 +139,7 @@ class Planner:
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
         best, stopped_by, details = np.inf, "", dict[str, Any]()
-        reasons = self.reasons
+        failed: dict[str, str] = {}
         if _crowded(scene):
             endpoints = self._fitting(scene) if scene.free_angle else scene.goal_pose[None]
             self._among = AmongObstacles(
@@ -157,7 +157,7 @@ class Planner:
                 try:
                     segments = assemble(scene, self.transits, self.usable, found.path)
                 except FlatpushError as error:
-                    reasons.setdefault(self.usable[found.path.pushes[0]].push.name, str(error))
+                    failed.setdefault(self.usable[found.path.pushes[0]].push.name, str(error))
                     continue
                 best, details = found.cost, found.details
                 yield Answer(best, partial(_solved, scene, segments, began, details), details)
@@ -169,7 +169,7 @@ class Planner:
                 yield answer
         if np.isinf(best):
             blocked = "" if self._among is None else self._among.tried.strip()
-            lines = (blocked, _listed(reasons))
+            lines = (blocked, _listed(self.reasons | failed))
             yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
 
     @property

@@ -1,12 +1,11 @@
 """From a push of a scene to its mechanics: fingertips, contacts and the limit surface of a model, all about the COF."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from ..contact import Placement, PointContact, cone_twists, narrowed, place_fingers
-from ..contact.table_set import TableSet, set_twists, shifted
+from ..contact import Placement, PointContact, cone_twists, place_fingers
+from ..contact.proved_twists import Bounds, proved_twists
 from ..errors import FlatpushError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import Outline, OutlinePoint
@@ -149,10 +148,10 @@ def _set_motions(thing: Object, placement: Placement, margin: float, nominal: by
     assert thing.uncertainty is not None
     known = thing.uncertainty
     low = known.friction[0] if known.friction else thing.friction
-    contacts = [replace(c, friction=low) for c in _contacts(thing, placement)]
-    cones = [narrowed(pair, margin) for pair in shifted(contacts, known.offset)]
-    tables = TableSet.of(thing.support, known.loads)
-    motions = set_twists(tables, cones, np.frombuffer(nominal).reshape(3, 3))
+    bounds = Bounds(known.loads, low, known.offset)
+    motions = proved_twists(
+        thing.support, _contacts(thing, placement), margin, np.frombuffer(nominal).reshape(3, 3), bounds
+    )
     motions.setflags(write=False)
     return motions
 
