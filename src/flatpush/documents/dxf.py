@@ -66,6 +66,12 @@ def read_dxf(path: str | os.PathLike[str]) -> Drawing:
     content = read_bytes(path)
     try:
         document = ezdxf.readfile(source)
+        if document.dxfversion <= "AC1009" and b"AcDbEntity" in content:
+            raise InputError(  # ezdxf then takes all layers for 0
+                "the drawing says that it is of R12, or nothing ($ACADVER), and has entities of later versions",
+                value=document.dxfversion,
+                hint="Save it as DXF R2000 or later, or as R12.",
+            )
         unit = _unit(document, content, source)
         reader = _Reader(document)
         reader.visit(document.modelspace(), "0", (), 0)
@@ -104,6 +110,7 @@ class _Reader:
         self.drawing = Drawing()
         self.count = 0
         self.clip = ""  # why the entities of a block are not seen as they are
+        self.line_type = "CONTINUOUS"  # of the insert of the block that is read
         self.layers = {layer.dxf.name.casefold(): layer for layer in document.layers}
         self.drawing.known.update(dict.fromkeys(layer.dxf.name for layer in document.layers))
 
@@ -182,13 +189,14 @@ class _Reader:
         from ezdxf.xclip import XClip
 
         skipped: list[str] = []
-        before, clip = self.clip, XClip(insert)
+        before, clip = (self.clip, self.line_type), XClip(insert)
+        self.line_type = self.type_of(insert, layer)
         if clip.has_clipping_path and clip.is_clipping_enabled:
             self.clip = f"its block {name!r} is clipped (XCLIP)"
         for one in insert.multi_insert() if insert.mcount > 1 else [insert]:
             parts = one.virtual_entities(skipped_entity_callback=lambda e, _: skipped.append(e.dxftype()))
             self.visit(parts, layer, (*blocks, name), level + 1)
-        self.clip = before
+        self.clip, self.line_type = before
         for kind in dict.fromkeys(skipped):
             if kind in _ASIDE:
                 self.drawing.left_out.append(LeftOut(f"{kind} in block {name!r}", _ASIDE[kind]))
@@ -203,16 +211,24 @@ class _Reader:
 
     def aside(self, entity: "DXFEntity", layer: str) -> str:
         """Why a line is no edge, by the type of the line and what becomes of its layer."""
-        name = entity.dxf.get("linetype", "BYLAYER")
         state = self.layers.get(layer.casefold())
         if state is not None and not state.dxf.get("plot", 1):
             return f"layer {layer!r} is not plotted"
-        if name.upper() in ("BYLAYER", "BYBLOCK"):
-            name = state.dxf.get("linetype", "CONTINUOUS") if state is not None else "CONTINUOUS"
+        name = self.type_of(entity, layer)
         for kind, words in _LINE_TYPES.items():
             if name.casefold().startswith(words):
                 return f"{kind} (line type {name})"
         return ""
+
+    def type_of(self, entity: "DXFEntity", layer: str) -> str:
+        """The name of the line type of an entity, which may be that of its layer or of the insert of its block."""
+        name = str(entity.dxf.get("linetype", "BYLAYER"))
+        if name.upper() == "BYBLOCK":
+            return self.line_type
+        state = self.layers.get(layer.casefold())
+        if name.upper() != "BYLAYER":
+            return name
+        return str(state.dxf.get("linetype", "CONTINUOUS")) if state is not None else "CONTINUOUS"
 
     def look_at_paper(self) -> None:
         """Tells that the lines are on paper, where the model space has none."""

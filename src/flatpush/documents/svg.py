@@ -164,6 +164,15 @@ class _Reader:
             self.left_out(element, state.hidden)
             self.remember(element, state)
             return
+        if "requiredExtensions" in element.attributes:
+            self.left_out(element, "not shown (requiredExtensions)")
+            return
+        if (language := element.attributes.get("systemLanguage")) is not None:
+            if language.strip():
+                self.unreadable(element, state, "whether it is shown depends on the language of the reader")
+            else:
+                self.left_out(element, "not shown (for no language)")
+            return
         try:
             if tag in SHAPES:
                 self.shape(element, state)
@@ -282,7 +291,7 @@ class _Reader:
             if language is not None and not language.strip():
                 continue  # of no language: never shown
             if language is not None:
-                self.unreadable(child, state, "whether it is shown depends on the language of the reader")
+                self.visit(child, state)  # which refuses it
                 return
             needs = child.attributes.get("requiredExtensions")
             if needs is not None or child.tag == "foreignObject":
@@ -337,7 +346,8 @@ class _Reader:
         if filled and not stroked and self.is_paper(element, state):
             aside = "a white rectangle as large as the page"
         dashes = [float(x) for x in NUMBERS.findall(style.get("stroke-dasharray", ""))]
-        if stroked and not filled and any(dashes):
+        gaps = (dashes if len(dashes) % 2 == 0 else 2 * dashes)[1::2]
+        if stroked and not filled and any(gaps):
             aside = f"a dashed line ({style['stroke-dasharray']})"
         marker = next((style[k] for k in ("marker-start", "marker-mid", "marker-end") if k in style), "none")
         if (

@@ -9,9 +9,9 @@ import numpy as np
 from .drawing import extent
 from .svg_path import EllipticArc, Segment, Straight, subpaths
 from .svg_style import GEOMETRY, Element
-from .svg_units import LENGTH, PX, UNITS
+from .svg_units import LENGTH, NUMBER, PX, UNITS
 
-NUMBERS = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+NUMBERS = re.compile(NUMBER)
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 
 

@@ -12,10 +12,10 @@ INHERITED = (
 GEOMETRY = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "d")
 USED = (
     *INHERITED, *GEOMETRY, "display", "opacity", "clip-path", "mask", "filter", "marker", "overflow",
-    "transform", "transform-origin", "transform-box", "translate", "rotate", "scale",
+    "transform", "transform-origin", "transform-box", "translate", "rotate", "scale", "offset-path",
 )  # fmt: skip
 # Those that an attribute of the same name does not set, as it means another thing or nothing.
-_ONLY_STYLE = ("translate", "rotate", "scale", "marker")
+_ONLY_STYLE = ("translate", "rotate", "scale", "offset-path", "marker")
 
 
 @dataclass(eq=False)

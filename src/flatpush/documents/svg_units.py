@@ -13,7 +13,9 @@ from .svg_style import Element
 UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6, "q": 0.25e-3}
 PX = 0.0254 / 96  # where a drawing mixes real lengths with its own units, these are CSS pixels
 _OLD_PX = 0.0254 / 90  # of Inkscape before 0.92
-LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([a-zA-Z%]*)\s*")
+NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+LENGTH = re.compile(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*")
+_WORD = re.compile(rf"{NUMBER}[a-zA-Z%]*")
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z0-9]+)\s*\(([^()]*)\)")
 NO_TURN = np.hstack([np.eye(2), np.zeros((2, 1))])
 
@@ -76,7 +78,7 @@ def transform(element: Element, style: Mapping[str, str]) -> Array:
     Raises:
         ValueError: if it is not understood; it says how.
     """
-    for name in ("translate", "rotate", "scale"):
+    for name in ("translate", "rotate", "scale", "offset-path"):
         if style.get(name, "none").lower() not in ("", "none"):
             raise ValueError(f"its style has {name}: {style[name]}, which is not read")
     text = style.get("transform", "").strip()
@@ -88,15 +90,19 @@ def transform(element: Element, style: Mapping[str, str]) -> Array:
         match = _FUNCTION.match(text, place)
         if match is None:
             raise ValueError(f"its transform is not understood ({text!r})")
-        matrix = joined(matrix, _function(match[1], match[2].replace(",", " ").split(), css, text))
+        words = _WORD.findall(match[2])  # numbers need nothing between them, as in translate(20-10)
+        if _WORD.sub("", match[2]).strip(" \t\r\n,"):
+            raise ValueError(f"its transform is not understood ({text!r})")
+        matrix = joined(matrix, _function(match[1], words, css, text))
         place = match.end()
     origin = style.get("transform-origin", "").replace(",", " ").split()
     if not np.all(np.isfinite(matrix)):
         raise ValueError(f"its transform is not finite ({text!r})")
+    boxed = style.get("transform-box", "view-box") != "view-box" and np.any(matrix[:, :2] != np.eye(2))
+    if boxed:  # then even the origin (0, 0) is a corner of the element
+        raise ValueError("its transform-box is not read")
     if not origin or all(word in ("0", "left", "top", "0px", "0%") for word in origin):
         return matrix
-    if style.get("transform-box", "view-box") != "view-box":
-        raise ValueError("its transform-box is not read")
     if len(origin) > 1 and (origin[0] in ("top", "bottom") or origin[1] in ("left", "right")):
         origin[:2] = origin[1], origin[0]
     at = np.array([0.0 if w in ("left", "top") else number(w) for w in origin[:2]])
@@ -175,9 +181,9 @@ def page_unit(root: Element) -> float | None:
         minor = float(f"0.{version[1]}") if version else 1.0
         return _OLD_PX if minor < 0.92 else PX
     scales = [
-        float(side[1]) * UNITS[side[2].lower()] / extent
+        float(side[1]) * {**UNITS, "": PX, "px": PX}[side[2].lower()] / extent
         for side, extent in zip(sides, box[2:].tolist(), strict=True)
-        if side and side[2].lower() in UNITS
+        if side and side[2].lower() in ("", "px", *UNITS)
     ]
     aspect = root.attributes.get("preserveAspectRatio", "").split()
     if aspect and aspect[0] != "none" and min(scales) > 0:
