@@ -288,6 +288,34 @@ def test_help_loads_nothing_heavy(tmp_path):
     assert ended.returncode == 0, ended.stderr
 
 
+def test_a_file_that_is_refused_loads_nothing_heavy(tmp_path):
+    """A second went into importing the simulator and the controllers before a misspelt name was told."""
+    (tmp_path / "cut.json").write_text('{"flatpush": "plan/1", "segments": [[0, 1')
+    (tmp_path / "cut.yaml").write_text("a: [1, 2\nb: {")
+    commands = [
+        [name, file, *rest]
+        for name, kind, *rest in [
+            ("verify", "json"), ("simulate", "json"), ("track", "json"), ("export", "json", "out.csv"),
+            ("run", "json", "--robot", "sim"), ("plan", "yaml"), ("describe", "yaml"),
+            ("calibrate", "csv", "--scene", "cut.yaml", "-o", "out.json"),
+        ]
+        for file in (f"missing.{kind}", f"cut.{kind}")
+    ]  # fmt: skip
+    code = (
+        "import sys\n"
+        "from flatpush.cli import main\n"
+        f"for words in {commands}:\n"
+        "    sys.argv = ['flatpush', *words]\n"
+        "    try: main()\n"
+        "    except SystemExit as ended: assert ended.code == 2, words\n"
+        "    heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'shapely', 'flatpush.problem'}\n"
+        "    assert not heavy & set(sys.modules), (words, heavy & set(sys.modules))"
+    )
+    ended = python("-c", code, cwd=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stderr.count("error: ") == len(commands)
+
+
 def test_a_plan_of_one_push_loads_no_compiler(folder):
     (folder / "scene.yaml").write_text(SCENE + "pushes: [{name: below, edge: 3, along: 0.5}]\n")
     code = (

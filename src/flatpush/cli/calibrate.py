@@ -33,15 +33,16 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Fit camera map, tag offsets, finger inset, lag and friction to LOGS, judged on starts that were left out."""
-    import numpy as np
-
     from ..documents import check_outputs
-    from ..documents.calibration_file import CalibrationFile, save_calibration
-    from ..simulation.joint_calibration import calibrate
 
     check_outputs([*logs, *scene], [output])
     carried = carried_of(tag)
     recordings, setup = read_recordings(logs, scene, carried, columns=columns, units=units, skip_bad=skip_bad)
+    import numpy as np
+
+    from ..documents.calibration_file import CalibrationFile, save_calibration
+    from ..simulation.joint_calibration import calibrate
+
     with telling("calibrating"):
         found = calibrate(recordings, setup)
     p, left = found.parameters, found.left_out

@@ -50,6 +50,7 @@ def command(
             raise InputError("a number of 1 or more is needed", key=name, value=value)
     if seed < 0:
         raise InputError("a seed is 0 or more", key="--seed", value=seed)
+    asked = [load_scene(scene) for scene in scenes]
     try:
         from ..gym.demonstrations import blocks, check_scenes
     except ImportError:
@@ -65,7 +66,6 @@ def command(
         from ..execution.bag import load as load_bags
 
         load_bags()
-    asked = [load_scene(scene) for scene in scenes]
     check_scenes(asked)
     folder = LeRobotFolder(output, seed, forms)
     began, empty = folder.episodes, 0

@@ -34,11 +34,14 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     """Show the friction model of SCENE and, for every push, its cone, flat point and turning radii."""
-    from ..documents import check_outputs, load_scene, outline_note, scene_files
+    from ..documents import check_outputs, load_scene, scene_files
+
+    loaded = load_scene(scene)
+    from ..documents import outline_note
     from ..planning import controllability, describe
     from ..planning.description import turning_radii
 
-    loaded, note = load_scene(scene), outline_note(scene)
+    note = outline_note(scene)
     if figure is not None:
         check_outputs(scene_files(scene), [figure])
     with telling("describing"):

@@ -21,23 +21,25 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> int:
     """Verify PLAN and write the pusher's timed poses: t [s], x, y, z [m], yaw [rad], segment; or a RAPID module."""
-    from ..documents import check_outputs, export_csv, export_rapid, load_plan, plan_files
-    from ..simulation import verify
+    from ..documents import check_outputs, load_plan, plan_files
 
-    write = {".csv": export_csv, ".mod": export_rapid}.get(file.suffix.lower())
-    if write is None:
+    if file.suffix.lower() not in (".csv", ".mod"):
         from ..errors import InputError
 
         raise InputError("export writes a .csv file, or a .mod file of RAPID for ABB", value=str(file))
     frame = numbers(base_frame, 4, "--base-frame")
     loaded = load_plan(plan)
     check_outputs(plan_files(plan, loaded.run), [file])
+    from ..documents import export_csv, export_rapid
+    from ..simulation import verify
+
     failed = verify(loaded).failed if loaded.status == "solved" else ()
     tell_failed(failed)
     if failed and not unverified:
         typer.echo("the plan fails verification; nothing was written (--unverified writes it)", err=True)
         return 4
     why = ", ".join(claim.name for claim in failed)
+    write = export_csv if file.suffix.lower() == ".csv" else export_rapid
     rows = write(loaded, file, None if frame is None else tuple(frame), unverified=why)
     if as_json:
         print_json({"file": str(file), "rows": rows, "verified": not failed})

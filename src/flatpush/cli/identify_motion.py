@@ -34,15 +34,17 @@ class Asked:
 
 def identify_motion(asked: Asked) -> int:
     """Fits, prints, writes the scene."""
-    from ..documents import load_motions, load_scene, save_fitted_scene
-    from ..documents.motion_file import own_or_plain
-    from ..identification import fit_motion, radii, suggest, summarise
-    from ..planning.candidates import automatic_pushes
+    from ..documents import load_scene
 
     if asked.output is not None and asked.output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError("the fitted scene is a YAML file", source=str(asked.output), hint="-o fitted.yaml")
     own, length, angle = layout_of([asked.scene], asked.columns, asked.units)
     scene = load_scene(asked.scene, unknown=True)
+    from ..documents import load_motions, save_fitted_scene
+    from ..documents.motion_file import own_or_plain
+    from ..identification import fit_motion, radii, suggest, summarise
+    from ..planning.candidates import automatic_pushes
+
     motions: list[Motion] = []
     for path in asked.data:
         columns = own if asked.columns else own_or_plain(path, own)

@@ -63,8 +63,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan document.")] = False,
 ) -> int:
     """Plan a push for SCENE, check the plan, and write it."""
-    from ..documents import as_read, check_outputs, load_scene, plan_document, save_plan, scene_files
-    from ..simulation import verify
+    from ..documents import as_read, check_outputs, load_scene, scene_files
 
     overrides: dict[str, Any] = {
         "start": numbers(start, 3, "--start"),
@@ -82,6 +81,9 @@ def command(
     }
     loaded = load_scene(scene, {key: value for key, value in overrides.items() if value})
     check_outputs(scene_files(scene), [output, figure, snapshots])
+    from ..documents import plan_document, save_plan
+    from ..simulation import verify
+
     if bound is not None:
         from ..planning.bound import check_bound
 

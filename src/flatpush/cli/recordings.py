@@ -45,13 +45,15 @@ def read_recordings(
     Raises:
         InputError: for a log or a scene that is none, scenes of different pushers or of one name.
     """
+    from ..documents import load_scene
+
+    read = [(path, load_scene(path)) for path in scenes]
     import numpy as np
 
-    from ..documents import load_robot_log, load_scene
+    from ..documents import load_robot_log
     from ..simulation.calibration import Setup
     from ..simulation.replay import Recording
 
-    read = [(path, load_scene(path)) for path in scenes]
     names = [scene.object.name for _, scene in read]
     if len(set(names)) < len(names):
         raise InputError("each scene has an object of a name of its own", key="object.name", value=names)

@@ -81,13 +81,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Verify PLAN, compare it with the limits of a robot, and run it there. Ctrl-C and SIGTERM stop the robot."""
-    from ..control import ARRIVED
-    from ..control.tracking.plan_controller import goal_error
     from ..documents import check_outputs, load_plan, load_scene, plan_files, scene_files
-    from ..execution import DONE, open_robot, run
-    from ..execution.log import check_log
-    from ..execution.run import to_controller, way
-    from ..simulation import verify
 
     if controller is not None and controller not in CONTROLLERS:
         raise InputError(f"--controller is one of {', '.join(CONTROLLERS)}", value=controller)
@@ -105,6 +99,13 @@ def command(
         )
     loaded = load_plan(plan)
     check_outputs(plan_files(plan, loaded.run), [log, figure, film])
+    from ..control import ARRIVED
+    from ..control.tracking.plan_controller import goal_error
+    from ..execution import DONE, open_robot, run
+    from ..execution.log import check_log
+    from ..execution.run import to_controller, way
+    from ..simulation import verify
+
     if log is not None:
         check_log(log)
     if film is not None:

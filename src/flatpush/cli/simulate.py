@@ -78,18 +78,19 @@ def command(
 ) -> int:
     """Roll PLAN out in the quasi-static contact simulator."""
     from ..documents import check_outputs, load_plan, plan_files
-    from ..problem.scene import MODELS
 
     if runs < 1:
         raise InputError("--runs is at least 1", value=runs)
     if seed < 0:
         raise InputError("--seed is 0 or more", value=seed)
-    if model not in MODELS:
-        raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
     if source not in ("arcs", "samples"):
         raise InputError("--source is arcs or samples", value=source)
-    noise = _noise(position, angle, friction, friction_range, df, centre, loads, model)
     loaded = load_plan(plan)
+    from ..problem.scene import MODELS
+
+    if model not in MODELS:
+        raise InputError(f"--model is one of {', '.join(MODELS)}", value=model)
+    noise = _noise(position, angle, friction, friction_range, df, centre, loads, model)
     check_outputs(plan_files(plan, loaded.run), [output, figure])
     warn_unverified(loaded)
     if loaded.status == "solved" and model == "exact":

@@ -108,9 +108,6 @@ def command(
     With --learn, PLAN may be a scene with support: unknown. Then the finger first makes short pushes that teach where
     the object presses on the table, and then brings it to its goal.
     """
-    from ..control import ARRIVED, Camera
-    from ..control.tracking.plan_controller import BESIDE, goal_error
-    from ..control.tracking.simulated_run import TrackedRun
     from ..documents import check_outputs, load_plan, plan_files
 
     if controller is not None and controller not in CONTROLLERS:
@@ -131,6 +128,16 @@ def command(
         numbers(centre, 2, "--centre") or [],
         numbers(start, 3, "--start") or [],
     )
+    if log is not None:
+        check_outputs([plan, table], [log, figure])
+        if log.suffix.lower() != ".csv":
+            raise InputError("the log of a simulated run ends in .csv", source=str(log))
+    given = _unknown(plan) or load_plan(plan)
+    from ..control import ARRIVED, Camera
+    from ..control.tracking.plan_controller import BESIDE, goal_error
+    from ..control.tracking.simulated_run import TrackedRun
+    from ..problem import Scene
+
     tracked = TrackedRun(
         cast("Law", controller or "path"),
         rate,
@@ -145,11 +152,7 @@ def command(
         seed,
         None if within is None else (within[0] / 1000, math.radians(within[1])),
     )
-    if log is not None:
-        check_outputs([plan, table], [log, figure])
-        if log.suffix.lower() != ".csv":
-            raise InputError("the log of a simulated run ends in .csv", source=str(log))
-    if (scene := _unknown(plan)) is not None:
+    if isinstance(given, Scene):
         if not learn:
             raise InputError(
                 "this scene does not know where its object presses on the table", source=str(plan),
@@ -161,26 +164,25 @@ def command(
             )
         if figure is not None:
             raise InputError("--figure draws a run beside its plan, and here is none", value=str(figure))
-        return _learned(tracked, scene, table, log, as_json)
+        return _learned(tracked, given, table, log, as_json)
     if table is not None:
         raise InputError("--table goes with a scene whose support is unknown", value=str(table))
-    loaded = load_plan(plan)
     if figure is not None:
         from ..view.picture import check_ending
 
-        check_outputs(plan_files(plan, loaded.run), [figure])
+        check_outputs(plan_files(plan, given.run), [figure])
         check_ending(figure)
-    warn_unverified(loaded)
-    tell_slow_way(loaded, rate=rate)
-    run = tracked.of(loaded, _progress(loaded.duration, rate) if sys.stderr.isatty() else None)
+    warn_unverified(given)
+    tell_slow_way(given, rate=rate)
+    run = tracked.of(given, _progress(given.duration, rate) if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     if log is not None:
         from ..execution.log import save_followed
 
-        save_followed(run, loaded.scene.object.name, log)
-    distance, turn = goal_error(loaded, run.object[-1])
-    how = "slides" if loaded.slides else tracked.controller
+        save_followed(run, given.scene.object.name, log)
+    distance, turn = goal_error(given, run.object[-1])
+    how = "slides" if given.slides else tracked.controller
     result = {
         "controller": how,
         "outcome": run.outcome,
@@ -197,7 +199,7 @@ def command(
 
         beside = "" if run.outcome.startswith(BESIDE) else f", off the goal by {error_text(distance, turn)}"
         title = f"{how} at {rate:g} Hz: {run.outcome}{beside}"
-        track_figure(loaded, run, figure, title)
+        track_figure(given, run, figure, title)
     if as_json:
         print_json(result)
     else:

@@ -18,10 +18,11 @@ def command(
 ) -> int:
     """Recompute every claim of PLAN from its scene; exit with 4 if one does not hold."""
     from ..documents import load_plan, load_scene
-    from ..simulation import verify
 
     loaded = load_plan(plan)
     trusted = None if scene is None else load_scene(scene)
+    from ..simulation import verify
+
     with telling("verifying"):
         report = verify(loaded, trusted)
     if as_json:

@@ -11,17 +11,18 @@ if TYPE_CHECKING:
     from .export import export_csv, export_rapid
     from .files_read import as_read, plan_files, scene_files
     from .fitted_scene import save_fitted_scene
+    from .loading import load_plan, load_scene
     from .log_columns import columns_of_scene, own_columns
     from .motion_file import Motion, MotionFile, is_motion_file, load_motions
     from .outline_reader import OutlineNote, outline_note
     from .pairs_file import PairsFile, load_pairs
-    from .plan_file import load_plan, parse_plan, plan_document, save_plan
+    from .plan_file import parse_plan, plan_document, save_plan
     from .reading import mapping_of, read_mapping
     from .robot_log import RobotLog, RobotRun, load_robot_log
     from .rollout_file import save_rollouts
     from .rows import BadRow
     from .runs_file import save_runs
-    from .scene_reader import load_scene, parse_ends, parse_scene
+    from .scene_reader import parse_ends, parse_scene
     from .scene_writer import scene_document
     from .schema import plan_schema, scene_schema
     from .surface_file import load_surface, save_surface
@@ -88,9 +89,9 @@ _HOME = {
     "export_csv": "export",
     "export_rapid": "export",
     "load_pairs": "pairs_file",
-    "load_plan": "plan_file",
+    "load_plan": "loading",
     "load_robot_log": "robot_log",
-    "load_scene": "scene_reader",
+    "load_scene": "loading",
     "load_surface": "surface_file",
     "mapping_of": "reading",
     "outline_note": "outline_reader",

@@ -22,14 +22,11 @@ from .plan_model import (
     SlideSegmentPart,
     TransitSegmentPart,
 )
-from .reading import join, plain, read_mapping
+from .reading import join, plain
 from .refusals import checked
 from .scene_digest import scene_digest
 from .scene_reader import parse_scene
 from .scene_writer import scene_document
-
-# Samples make plans longer than scenes.
-MOST_BYTES = 200_000_000
 
 
 def save_plan(plan: Plan, path: str | os.PathLike[str]) -> None:
@@ -58,16 +55,6 @@ def plan_document(plan: Plan) -> dict[str, object]:
         "segments": [_segment(s, join("segments", i)) for i, s in enumerate(plan.segments)],
         "certificate": {} if plan.certificate is None else _certificate(plan.certificate),
     }
-
-
-def load_plan(path: str | os.PathLike[str]) -> Plan:
-    """The plan in a file that save_plan wrote. Its claims are not checked: that is verify's task.
-
-    Raises:
-        InputError: for anything wrong with the file; it names the file, the key, the value, the rule and a
-            hint.
-    """
-    return parse_plan(read_mapping(path, MOST_BYTES, MOST_BYTES), os.fspath(path))
 
 
 def parse_plan(document: Mapping[str, object], source: str = "") -> Plan:

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError
 
 MOST_BYTES = 10_000_000
@@ -110,15 +108,17 @@ def plain(value: object, source: str = "", key: str = "", level: int = 0) -> obj
     """The value with tuples and NumPy arrays as lists, NumPy scalars as numbers, mappings as dicts."""
     if level > MOST_LEVELS:
         raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=key)
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
     if isinstance(value, Mapping):
         return {str(k): plain(v, source, join(key, str(k)), level + 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [
             v if type(v) in _PLAIN else plain(v, source, join(key, i), level + 1) for i, v in enumerate(value)
         ]
-    return value
+    if type(value) in _PLAIN:
+        return value
+    import numpy as np  # not for a file that is refused before
+
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def join(path: str, step: str | int) -> str:

@@ -1,6 +1,5 @@
 """Builds a Scene in SI from a scene document."""
 
-import os
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -16,7 +15,7 @@ from . import scene_model as m
 from .context import PER_METRE, Context
 from .outline_reader import pixels, read_drawing
 from .push_reader import open_polygon, read_pushes
-from .reading import MOST_ENTRIES, join, plain, read_mapping
+from .reading import MOST_ENTRIES, join, plain
 from .refusals import checked, nearest
 
 # Keys of the pusher that are lengths, or lengths over time.
@@ -26,24 +25,6 @@ LENGTHS = (
 )
 # A pose whose angle is more than two turns was written in degrees.
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
-
-
-def load_scene(
-    path: str | os.PathLike[str], changes: Mapping[str, object] | None = None, *, unknown: bool = False
-) -> Scene:
-    """The scene in a YAML or JSON file, in SI.
-
-    Args:
-        path: of the file.
-        changes: keys of the document that take the place of the file's, in the file's units, as
-            {"start": [60, 20, 135], "planning": {"seed": 3}}; mappings replace only the keys that they hold.
-        unknown: whether a scene is read that does not know where the object presses (support: unknown).
-
-    Raises:
-        InputError: for anything wrong with the file; it names the file, key, value, rule and a hint.
-        MissingExtra: if the outline is a drawing and the extra "shapes" is not installed.
-    """
-    return parse_scene(_merged(read_mapping(path), changes or {}), os.fspath(path), unknown=unknown)
 
 
 def parse_scene(
@@ -95,14 +76,6 @@ def parse_ends(document: Mapping[str, object]) -> tuple[Array, Array]:
     model = checked(m.SceneModel, raw, "", "")
     ctx = Context("", "", raw, PER_METRE[model.units.length], model.units.angle == "deg")
     return _pose(ctx, model.start, "start"), _goal(ctx, model.goal)
-
-
-def _merged(document: Any, changes: Mapping[str, object]) -> Any:
-    result = dict(document)
-    for key, value in changes.items():
-        old = result.get(key)
-        result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, Mapping) else value
-    return result
 
 
 def _check_lengths(value: object, source: str, key: str) -> None:
