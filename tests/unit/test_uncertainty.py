@@ -7,7 +7,8 @@ import pytest
 
 import flatpush as fp
 from flatpush.contact import proved_twists
-from flatpush.documents import load_plan
+from flatpush.documents import load_plan, scene_document
+from flatpush.documents.reading import mapping_of
 from flatpush.documents.scene_reader import parse_scene
 from flatpush.errors import InputError
 from flatpush.geometry import perpendicular
@@ -142,6 +143,36 @@ def test_one_finger_is_refused_with_what_would_do():
 def test_sets_that_make_no_sense(uncertainty, message):
     with pytest.raises(fp.InputError, match=message):
         parse_scene(changed(**uncertainty))
+
+
+@pytest.mark.parametrize("text", ["20 %", "20%", "20.0 %"])
+def test_a_share_may_be_written_in_per_cent(text):
+    """As a file says it; the scene, and so the plan, holds the number."""
+    document = mapping_of(f"flatpush: scene/1\nobject: {{uncertainty: {{loads: {text}}}}}\n")
+    scene = parse_scene(changed(**document["object"]["uncertainty"]))
+    assert scene.object.uncertainty.loads == 0.2
+    assert scene_document(scene)["object"]["uncertainty"]["loads"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("120 %", "less than 100 %"),
+        ("100 %", "less than 100 %"),
+        ("-5 %", "at least 0 %"),
+        ("20 mm", "a number or in per cent"),
+        ("20", "a number or in per cent"),
+        ("%", "a number or in per cent"),
+        ("", "a number or in per cent"),
+        ("nan %", "a number or in per cent"),
+        ("1e999 %", "a number or in per cent"),
+    ],
+)
+def test_what_is_no_share_is_refused_with_its_place(text, rule):
+    with pytest.raises(InputError, match=rule) as refused:
+        parse_scene(changed(loads=text))
+    assert refused.value.key == "object.uncertainty.loads"
+    assert refused.value.value == text
 
 
 def test_a_known_surface_has_no_loads():

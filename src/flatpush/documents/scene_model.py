@@ -1,9 +1,19 @@
 """The structure of a scene document, in the units of its file. What a description says is also the hint of an
 error."""
 
+import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 # No length or angle of a file is beyond this in any unit; it keeps products of lengths finite.
@@ -231,12 +241,44 @@ SurfaceForm = Annotated[
 ]
 
 
+PER_CENT = re.compile(r"([+-]?[0-9]+(?:\.[0-9]+)?) ?%", re.ASCII)
+
+
+def _share(value: object) -> object:
+    """A share that is written in per cent, as a number."""
+    if not isinstance(value, str):
+        return value
+    if (found := PER_CENT.fullmatch(value.strip())) is None:
+        rule = "a share is a number or in per cent, 0.2 or 20 %"
+    elif 0 <= (share := float(found[1]) / 100) < 1:
+        return share
+    else:
+        rule = "a share of at least 0 % and less than 100 % is needed"
+    raise PydanticCustomError("form", "{rule}", {"rule": rule})
+
+
+Share = Annotated[
+    float,
+    Field(ge=0, lt=1, allow_inf_nan=False),
+    BeforeValidator(_share),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "exclusiveMaximum": 1},
+                {"type": "string", "pattern": r"^\s*[+-]?[0-9]+(\.[0-9]+)? ?%\s*$"},
+            ]
+        }
+    ),
+]
+
+
 class UncertaintyPart(Part):
     """How well pressure and friction are known."""
 
-    loads: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] = Field(
+    loads: Share = Field(
         default=0.0,
-        description="The share by which pressure times table friction may differ at every point, 0 to less than 1.",
+        description="The share by which pressure times table friction may differ at every point, 0 to less than 1,"
+        " or as 20 %.",
     )
     friction: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="[least, greatest] coefficient between fingertip and object."
