@@ -138,11 +138,30 @@ def test_one_finger_is_refused_with_what_would_do():
         ({"friction": [0.5, 0.3]}, "low"),
         ({"offset": -1}, "offset"),
         ({"weight": 0.1}, "unknown key"),
+        ({}, "states loads, friction or offset"),
+        ({"friction": []}, "at least 2 entries"),
     ],
 )
 def test_sets_that_make_no_sense(uncertainty, message):
-    with pytest.raises(fp.InputError, match=message):
+    with pytest.raises(fp.InputError, match=message) as refused:
         parse_scene(changed(**uncertainty))
+    assert refused.value.key.startswith("object.uncertainty")
+
+
+def test_a_start_whose_offsets_reach_an_obstacle_is_refused():
+    """Itself it is 0.7 mm away; the fingers may stand 1 mm beside their place."""
+    wall = [[60, -80], [120, -80], [120, -70], [60, -70]]
+    scene = {**changed(offset=1.0), "start": [60, -98.2, 0], "workspace": {"obstacles": [wall]}}
+    with pytest.raises(InputError, match=r"0.70 mm from obstacle 0, and 1.00 mm .* offset along") as refused:
+        fp.plan(parse_scene(scene))
+    assert refused.value.key == "start"
+
+
+def test_an_offset_on_a_round_side_is_refused_with_its_length():
+    scene = {**changed(offset=0.2), "pushes": "auto"}
+    scene["object"]["outline"] = {"circle": 25}
+    reason = fp.plan(parse_scene(scene)).reason
+    assert "here 0.2 mm, needs two fingers on one straight side" in reason
 
 
 @pytest.mark.parametrize("text", ["20 %", "20%", "20.0 %"])

@@ -259,7 +259,10 @@ def shifted(contacts: Sequence[PointContact], offset: float) -> list[list[PointC
         return [list(contacts)]
     a, b = contacts
     if float(a.normal @ b.normal) < 1 - PARALLEL or abs(float((b.point - a.point) @ a.normal)) > PARALLEL:
-        raise InputError("an offset of the grasp needs two fingers on one straight side", value=offset)
+        raise InputError(
+            f"an offset of the grasp, here {1000 * offset:g} mm, needs two fingers on one straight side",
+            hint="Leave the offset out, or push on a straight side.",
+        )
     along = perpendicular(a.normal)
     return [[replace(c, point=c.point + s * offset * along) for c in (a, b)] for s in (-1.0, 0.0, 1.0)]
 

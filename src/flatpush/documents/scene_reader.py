@@ -147,6 +147,12 @@ def _object(ctx: Context, part: m.ObjectPart) -> Object:
 def _uncertainty(ctx: Context, part: m.UncertaintyPart | None) -> Uncertainty | None:
     if part is None:
         return None
+    if not part.model_fields_set:
+        raise ctx.refuse(
+            "an uncertainty states loads, friction or offset",
+            "object.uncertainty",
+            hint="Without any, leave it out.",
+        )
     low_high = None if part.friction is None else (part.friction[0], part.friction[1])
     offset = part.offset / ctx.per_metre if "offset" in part.model_fields_set else 0.0
     return Uncertainty(part.loads, low_high, offset)
