@@ -46,6 +46,7 @@ _MOST_NESTED, _MOST_ENTITIES = 8, 200_000
 # A variable of the header begins with 9; the same word in a text does not declare anything.
 _SET = re.compile(rb"^[ \t]*9[ \t]*\r?\n[ \t]*\$INSUNITS[ \t]*\r?$|\x09\x00?\$INSUNITS\x00", re.M)
 _DECLARED = re.compile(rb"\s*70\s*\r?\n\s*(-?[0-9]+)")
+_DASH = 49  # group of a line type: length of a dash, negative for a gap
 _FRAME_POINT = 16  # flag of a vertex that only controls the curve of its POLYLINE
 
 
@@ -218,6 +219,10 @@ class _Reader:
         for kind, words in _LINE_TYPES.items():
             if name.casefold().startswith(words):
                 return f"{kind} (line type {name})"
+        known = self.document.linetypes
+        pattern = known.get(name).pattern_tags.tags if name in known else ()
+        if any(tag.code == _DASH and tag.value < 0 for tag in pattern):
+            return f"a line with gaps (line type {name})"  # as MITTE and VERDECKT
         return ""
 
     def type_of(self, entity: "DXFEntity", layer: str) -> str:

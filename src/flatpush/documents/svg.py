@@ -216,9 +216,9 @@ class _Reader:
         moving = next((child.tag for child in element.children if child.tag in _MOVING), "")
         if moving and not page:
             refusal = f"it moves (<{moving}>)"
-        matrix = state.matrix
-        if not page:
-            matrix = joined(matrix, transform(element, style))
+        matrix = joined(state.matrix, transform(element, style))
+        if page and np.any(matrix != state.matrix):
+            raise ValueError("it has a transform, which programs read differently for a whole page")
         result = replace(
             state, matrix=matrix, style=style, hidden=hidden, names=(*state.names, *own),
             layer=layer, refusal=refusal,
@@ -330,7 +330,7 @@ class _Reader:
         return replace(state, matrix=matrix, viewport=inner, window=window, refusal=refusal)
 
     def shape(self, element: Element, state: _State) -> None:
-        style = state.style
+        style = {**state.style, **self.fallbacks(state.style)}
         if style.get("visibility", "").lower() in ("hidden", "collapse"):
             reason = f"hidden (visibility: {style['visibility']})"
             self.left_out(element, reason)
@@ -370,6 +370,15 @@ class _Reader:
                     self.left_out(
                         element, f"half of the width of its line ({width:.3g} in all), beyond its middle"
                     )
+
+    def fallbacks(self, style: Mapping[str, str]) -> dict[str, str]:
+        """What is painted instead of a gradient or pattern that is not in the drawing: nothing if not said."""
+        found = {kind: _URL.match(style.get(kind, "")) for kind in ("fill", "stroke")}
+        return {
+            kind: style[kind][match.end() :].strip() or "none"
+            for kind, match in found.items()
+            if match and match[1].startswith("#") and match[1][1:] not in self.ids
+        }
 
     def is_paper(self, element: Element, state: _State) -> bool:
         """Whether a shape is a white rectangle that covers the page."""

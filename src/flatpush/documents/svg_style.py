@@ -115,6 +115,8 @@ def sheet_rules(text: str, before: int) -> list[Rule]:
             if word in ("@import",) or any(declarations(part) for _, part in _blocks(body)):
                 raise Unsupported(f"the style sheet has {word}")
             continue
+        if "{" in body:
+            raise Unsupported("the style sheet has rules in rules")
         wanted = declarations(body)
         if not wanted:
             continue
