@@ -214,8 +214,9 @@ def _unknown(path: Path) -> Scene | None:
         InputError: for a scene whose support is known: it is planned first.
     """
     from ..documents import load_scene, read_mapping
+    from ..documents.reading import MOST_BYTES_OF_SCENE as MOST
 
-    kind = read_mapping(path).get("flatpush") if path.suffix.lower() in (".yaml", ".yml") else None
+    kind = read_mapping(path, MOST).get("flatpush") if path.suffix.lower() in (".yaml", ".yml") else None
     if not str(kind).startswith("scene/"):
         return None
     scene = load_scene(path, unknown=True)

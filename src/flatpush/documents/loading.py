@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from .reading import read_mapping
+from .reading import MOST_BYTES_OF_SCENE, read_mapping
 
 if TYPE_CHECKING:
     from ..problem import Plan, Scene
@@ -32,7 +32,7 @@ def load_scene(
         InputError: for anything wrong with the file; it names the file, key, value, rule and a hint.
         MissingExtra: if the outline is a drawing and the extra "shapes" is not installed.
     """
-    document = _merged(read_mapping(path), changes or {})
+    document = _merged(read_mapping(path, MOST_BYTES_OF_SCENE), changes or {})
     from .scene_reader import parse_scene
 
     return parse_scene(document, os.fspath(path), unknown=unknown)

@@ -10,6 +10,9 @@ from typing import Any
 from ..errors import InputError
 
 MOST_BYTES = 10_000_000
+# Of a scene: 100,000 corners of ten bytes a number, or 50,000 at full precision; drawings are files of their own. As
+# YAML it is read within a second and a half; 10 MB took twelve.
+MOST_BYTES_OF_SCENE = 2_000_000
 MOST_LEVELS = 60
 MOST_ENTRIES = 100_000  # of one list; samples of a plan may be more
 # What most of the entries of long lists are: nothing in them is looked for.
@@ -177,41 +180,57 @@ def _read_yaml(text: str, source: str, longest: int) -> Any:
     holders: list[Any] = [root]  # the open lists and mappings, outermost first
     steps: list[Any] = [None]  # the pending key of each open mapping; None where a key comes next
     documents = 0
+    # A list of as many points as it may hold, and the rest: short numbers make many in few bytes.
+    count, in_all = 0, 3 * longest + 20_000
+    node, scalar, start_of_list, alias = (
+        yaml.NodeEvent, yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.AliasEvent,
+    )  # fmt: skip
     try:
         for event in yaml.parse(text, Loader=loader):
-            if isinstance(event, yaml.DocumentStartEvent):
+            # Places are only made into words for a refusal: a large file has hundreds of thousands of entries.
+            if isinstance(event, node):
+                count += 1
+                if count > in_all:
+                    rule = f"a document has at most {in_all} keys, values and lists"
+                    raise InputError(rule, source=source, hint="Is it the right file?")
+                if type(event) is alias or event.tag is not None or len(holders) > MOST_LEVELS:
+                    _refuse_tricks(event, source, holders, steps)
+                holder = holders[-1]
+                is_scalar, is_mapping = type(event) is scalar, type(holder) is dict
+                if is_mapping and steps[-1] is None:
+                    if not is_scalar:
+                        raise InputError(
+                            "a key is a word",
+                            source=source,
+                            key=_path(holders, steps),
+                            hint="Quote braces in text.",
+                        )
+                    if event.value in holder:
+                        _refuse_twice(event.value, holder, source, _path(holders, steps))
+                    steps[-1] = event.value
+                    continue
+                value: Any = [] if type(event) is start_of_list else {}
+                if is_scalar:
+                    value = _scalar(event.value) if event.implicit[0] else event.value
+                if is_mapping:
+                    holder[steps[-1]] = value
+                    steps[-1] = None
+                else:
+                    if len(holder) == longest:
+                        _refuse_long(longest + 1, longest, source, _path(holders, steps))
+                    holder.append(value)
+                if not is_scalar:
+                    holders.append(value)
+                    steps.append(None)
+            elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
+                holders.pop()
+                steps.pop()
+            elif isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
                     raise InputError(
                         "a file holds one document", source=source, hint="Remove the second ---."
                     )
-            elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
-                holders.pop()
-                steps.pop()
-            elif isinstance(event, yaml.NodeEvent):
-                path = _path(holders, steps)
-                _refuse_tricks(event, source, path, len(holders))
-                holder = holders[-1]
-                if isinstance(holder, dict) and steps[-1] is None:
-                    if not isinstance(event, yaml.ScalarEvent):
-                        raise InputError(
-                            "a key is a word", source=source, key=path, hint="Quote braces in text."
-                        )
-                    _refuse_twice(event.value, holder, source, path)
-                    steps[-1] = event.value
-                    continue
-                value: Any = [] if isinstance(event, yaml.SequenceStartEvent) else {}
-                if isinstance(event, yaml.ScalarEvent):
-                    value = _scalar(event.value) if event.implicit[0] else event.value
-                if isinstance(holder, dict):
-                    holder[steps[-1]] = value
-                    steps[-1] = None
-                else:
-                    holder.append(value)
-                    _refuse_long(len(holder), longest, source, path)
-                if not isinstance(event, yaml.ScalarEvent):
-                    holders.append(value)
-                    steps.append(None)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
@@ -238,23 +257,28 @@ def _path(holders: list[Any], steps: list[Any]) -> str:
     return path
 
 
-def _refuse_tricks(event: Any, source: str, path: str, level: int) -> None:
+def _refuse_tricks(event: Any, source: str, holders: list[Any], steps: list[Any]) -> None:
     import yaml
 
     if isinstance(event, yaml.AliasEvent):
         raise InputError(
             "aliases (*name) are not read",
             source=source,
-            key=path,
+            key=_path(holders, steps),
             value=f"*{event.anchor}",
             hint="Write it out.",
         )
     if event.tag not in (None, "!"):
         raise InputError(
-            "tags (!name) are not read", source=source, key=path, value=event.tag, hint="Leave it out."
+            "tags (!name) are not read",
+            source=source,
+            key=_path(holders, steps),
+            value=event.tag,
+            hint="Leave it out.",
         )
-    if level > MOST_LEVELS:
-        raise InputError(f"a document has at most {MOST_LEVELS} levels", source=source, key=path[:80])
+    if len(holders) > MOST_LEVELS:
+        rule = f"a document has at most {MOST_LEVELS} levels"
+        raise InputError(rule, source=source, key=_path(holders, steps)[:80])
 
 
 def _refuse_long(count: int, longest: int, source: str, path: str) -> None:

@@ -1,6 +1,7 @@
 """Builds a Scene in SI from a scene document."""
 
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any, Literal
 
 import numpy as np
@@ -93,7 +94,7 @@ def _checked_version(raw: object, source: str, key: str) -> dict[str, Any]:
         raise InputError("a scene is a mapping of keys to values", source=source, key=key, value=raw)
     if "flatpush" not in raw:
         # A misspelt key is named as such.
-        near = [k for k in raw if nearest(k, ["flatpush"]).startswith("Did")]
+        near = [k for k in islice(raw, 100) if nearest(k, ["flatpush"]).startswith("Did")]
         hint = f"Did you mean 'flatpush' by {near[0]!r}?" if near else "Begin a scene with flatpush: scene/1."
         raise InputError("this key is missing", source=source, key=join(key, "flatpush"), hint=hint)
     version = raw["flatpush"]
