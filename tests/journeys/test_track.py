@@ -3,6 +3,7 @@
 import itertools
 import json
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -170,8 +171,11 @@ def test_a_push_of_one_sample_is_refused(plan):
     (push,) = plan[0].pushes
     still = replace(push, times=push.times[:1], object=push.object[:1], pusher=push.pusher[:1], arcs=())
     segments = tuple(still if s is push else s for s in plan[0].segments)
-    with pytest.raises(fp.InputError, match="has no motion"):
-        PlanController.of(replace(plan[0], segments=segments))
+    damaged = replace(plan[0], segments=segments)
+    for follow in (PlanController.of, fp.simulate, partial(fp.study, runs=2)):
+        with pytest.raises(fp.InputError, match="has no motion") as refused:
+            follow(damaged)
+        assert refused.value.key == f"segments[{[s is still for s in segments].index(True)}]"
 
 
 def test_the_slow_way_is_told_with_the_time_that_it_takes(plan, monkeypatch, capsys):

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..errors import InputError
 from ..geometry.pose import Array
 from .certificate import Certificate
 from .scene import Scene
@@ -137,6 +138,24 @@ class Plan:
     def on_table(self) -> tuple[TableSegment, ...]:
         """Pushes and slides in order: the segments in which the object moves."""
         return tuple(s for s in self.segments if not isinstance(s, TransitSegment))
+
+    def check_motion(self) -> None:
+        """Refuses a plan that nobody can follow.
+
+        Raises:
+            InputError: for a plan without a solution, and for a push or slide without motion.
+        """
+        if self.status != "solved":
+            raise InputError("there is no plan to follow", hint=self.reason)
+        for i, segment in enumerate(self.segments):
+            if isinstance(segment, TransitSegment):
+                continue
+            if len(segment.times) < 2 or (isinstance(segment, PushSegment) and not segment.arcs):
+                raise InputError(
+                    f"the push {segment.push!r} has no motion",
+                    key=f"segments[{i}]",
+                    hint="The plan is damaged; plan anew.",
+                )
 
     def save(self, path: str | Path) -> None:
         """Writes the plan document (JSON, SI), whole or not at all."""

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..friction.surface import LimitSurface
 from ..geometry import inverse, transform
 from ..geometry.pose import Array
@@ -41,10 +40,9 @@ def simulate(
         source: the pusher's way: the plan's "arcs" exactly, or straight between its "samples".
 
     Raises:
-        InputError: for a plan without a solution.
+        InputError: for a plan without a solution, or with a push without motion.
     """
-    if plan.status != "solved":
-        raise InputError("there is no plan to roll out", hint=plan.reason)
+    plan.check_motion()
     scene = plan.scene
     if perturbation is not None:
         disturbances = Disturbances(scene, perturbation, model)

@@ -125,8 +125,7 @@ def study(
         raise InputError("a study has at least 1 run", value=runs)
     if seed < 0:
         raise InputError("a seed is 0 or more", value=seed)
-    if plan.status != "solved":
-        raise InputError("there is no plan to roll out", hint=plan.reason)
+    plan.check_motion()
     chosen = Noise() if noise is None else noise
     Disturbances(plan.scene, chosen, model)  # refuses here what no worker should be asked
     chunks = [

@@ -126,6 +126,7 @@ class PlanController(AbstractController[PlanState]):
             InputError: for a plan without pushes, a push without motion, and as the laws do.
         """
         check_pushes(plan)
+        plan.check_motion()
         scene, first = plan.scene, plan.pushes[0]
         limits = Limits.of(scene.pusher, first.fingers, scene.object.outline.size)
         goal = scene.planning.goal_tolerance
@@ -141,10 +142,6 @@ class PlanController(AbstractController[PlanState]):
         )
         found: list[OnePush] = []
         for segment in plan.pushes:
-            if len(segment.times) < 2 or not segment.arcs:
-                raise InputError(
-                    f"the push {segment.push!r} has no motion", hint="The plan is damaged; plan anew."
-                )
             option = push_option(scene, named(scene, segment.push))
             if option.car is None:
                 raise InputError(f"the push {segment.push!r} cannot be steered: {option.refusal}")
