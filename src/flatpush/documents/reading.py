@@ -180,12 +180,10 @@ def _read_yaml(text: str, source: str, longest: int) -> Any:
     holders: list[Any] = [root]  # the open lists and mappings, outermost first
     steps: list[Any] = [None]  # the pending key of each open mapping; None where a key comes next
     documents = 0
-    event: Any
     # A list of as many points as it may hold, and the rest: short numbers make many in few bytes.
     count, in_all = 0, 3 * longest + 20_000
-    node, scalar, start_of_list, alias = (
-        yaml.NodeEvent, yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.AliasEvent,
-    )  # fmt: skip
+    node: Any = yaml.NodeEvent
+    scalar, start_of_list, alias = yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.AliasEvent
     try:
         for event in yaml.parse(text, Loader=loader):
             # Places are only made into words for a refusal: a large file has hundreds of thousands of entries.
