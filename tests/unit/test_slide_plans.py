@@ -17,6 +17,8 @@ from flatpush.planning.bound import bounded
 from flatpush.simulation.plant import Plant
 
 BRICK = [(-0.03, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.03, 0.02)]
+# Where a slide and then a push cost less than either alone.
+MIXED = (0.0242, 0.0294, -1.1663)
 
 
 def slippery(**changes) -> fp.Scene:
@@ -142,11 +144,10 @@ def test_a_disc_that_nothing_turns_is_told():
 
 @pytest.mark.slow
 def test_slides_never_make_a_plan_costlier():
-    """Nor do slides and cars in one plan, which the fifth is."""
-    rng = np.random.default_rng(3)
+    """Nor do slides and cars in one plan."""
+    starts = ((-0.0226, -0.0374, -0.9401), (-0.0117, 0.0073, -0.8316), (0.0573, -0.0795, 0.2605), MIXED)
     kinds = []
-    for _ in range(6):
-        start = rng.uniform(-1, 1, 3) * [0.08, 0.08, np.pi]
+    for start in starts:
         thing = fp.Object(BRICK, friction=0.2)
         alone = fp.plan(fp.Scene(thing, start))
         both = fp.plan(fp.Scene(thing, start, planning=fp.Planning(slides="join")))
@@ -160,9 +161,8 @@ def test_slides_never_make_a_plan_costlier():
 @pytest.mark.slow
 def test_a_slide_and_a_push_in_one_plan(tmp_path):
     """Rolled out by a plant of our own they end at the goal; the yaw goes on, and the document reads back."""
-    start = (-0.0111, 0.0139, 1.494)
     thing = fp.Object(BRICK, friction=0.2)
-    plan = fp.plan(fp.Scene(thing, start, planning=fp.Planning(slides="join")))
+    plan = fp.plan(fp.Scene(thing, MIXED, planning=fp.Planning(slides="join")))
     kinds = [s.kind for s in plan.segments if s.kind != "transit"]
     assert kinds[0] == "slide"
     assert set(kinds[1:]) == {"push"}
