@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.mutants import entries, problems
 from tests.waiting import python
 
 ROOT = Path(__file__).parents[2]
@@ -111,6 +112,10 @@ def test_every_row_of_the_equations_has_a_change_that_its_own_test_must_notice()
         if not any(test == one or test.startswith(f"{one}::") for test in named for one in own):
             unbroken.add(name)
     assert unbroken == UNBROKEN
+
+
+def test_each_change_that_tests_must_notice_stands_in_the_source_once():
+    assert not list(problems(entries()))
 
 
 def test_no_sentence_of_the_documents_is_cut():
