@@ -63,8 +63,7 @@ def parse_plan(document: Mapping[str, object], source: str = "") -> Plan:
     Raises:
         InputError: as load_plan.
     """
-    raw = plain(document, source)
-    version = raw.get("flatpush") if isinstance(raw, dict) else None
+    version = document.get("flatpush") if isinstance(document, Mapping) else None
     if version != "plan/1":
         hint = "Is it a plan? flatpush plan SCENE -o FILE writes one."
         if isinstance(version, str) and version.startswith("scene/"):
@@ -72,7 +71,7 @@ def parse_plan(document: Mapping[str, object], source: str = "") -> Plan:
         raise InputError(
             "this flatpush reads plan/1", source=source, key="flatpush", value=version, hint=hint
         )
-    model = checked(PlanModel, raw, source)
+    model = checked(PlanModel, plain(document, source), source)
     solved = model.status == "solved"
     if solved != (model.cost is not None):
         rule = "a solved plan has a cost" if solved else "without a plan there is no cost"
