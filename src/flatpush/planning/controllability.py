@@ -23,8 +23,9 @@ def controllability(cars: Sequence[Car]) -> Controllability:
     """What the cars of an object can do together.
 
     "free" is small-time local controllability: the twists positively span a great circle of the velocity sphere that
-    is not ω = 0 ([Lynch1996] Prop. 4), that is, the largest linear space inside their cone has two dimensions or more
-    and is not the plane of translations. Any single car already reaches every pose ("detours", Props. 1-2).
+    is not ω = 0 ([Lynch1996] Prop. 4), that is, the largest linear space inside their cone has two dimensions or more.
+    It is never the plane of translations alone: with that a car's turn to one side undoes its turn to the other. Any
+    single car already reaches every pose ("detours", Props. 1-2).
     """
     if not cars:
         return "none"
@@ -36,8 +37,7 @@ def controllability(cars: Sequence[Car]) -> Controllability:
     if len(both_ways) == 0:
         return "detours"
     rank = int(np.linalg.matrix_rank(both_ways, tol=1e-6))
-    turns = bool(np.any(np.abs(both_ways[:, 2]) > 1e-6))
-    return "free" if rank >= 2 and turns else "detours"
+    return "free" if rank >= 2 else "detours"
 
 
 def _inside(rays: Array, vectors: Array) -> Array:
