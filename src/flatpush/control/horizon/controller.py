@@ -26,7 +26,7 @@ from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
 from .push_path import PushPath
 from .state import HorizonState, LearningWindow
-from .surroundings import GUARD, Surroundings, Thoughts
+from .surroundings import GUARD, Surroundings, Thoughts, crowded
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
 # friction that is a fifth less than believed.
@@ -75,7 +75,7 @@ class HorizonController(AbstractController[HorizonState]):
         body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
         bounds: xmin, ymin, xmax, ymax [m]; a push ends before the object or the finger would leave them, and another is
-            tried. Ways are planned without regard to them.
+            tried. Paths are planned without regard to them.
         surroundings: what paths, landings and retreats keep clear of; None where nothing is in the way.
     """
 
@@ -131,25 +131,12 @@ class HorizonController(AbstractController[HorizonState]):
             rate, tolerance, landings, body: see the attributes.
 
         Raises:
-            InputError: for two fingers, obstacles or bounds (replanning does not see them), or no push that steers.
+            InputError: for two fingers, no push that steers, or what surroundings.crowded refuses.
         """
         scene = plan.scene if isinstance(plan, Plan) else plan
         if not (np.isfinite(latency) and latency >= 0):
             raise InputError("a latency is 0 or more", key="latency", value=latency)
-        crowded = scene.workspace.bounds is not None or bool(scene.workspace.obstacles)
-        if crowded and scene.pusher.transit != "lift":
-            raise InputError(
-                "among bounds and obstacles the horizon controller lifts the finger between pushes",
-                key="pusher.transit",
-                value=scene.pusher.transit,
-                hint="transit: lift, or follow the plan with the path controller.",
-            )
-        if crowded and np.isnan(scene.goal_pose[2]):
-            raise InputError(
-                "among bounds and obstacles the horizon controller needs a goal with an angle",
-                key="goal",
-                hint="Give the angle that the plan ends with.",
-            )
+        among = crowded(scene)
         if scene.pusher.fingers != 1:
             raise InputError(
                 "the horizon controller steers with one finger",
@@ -165,7 +152,7 @@ class HorizonController(AbstractController[HorizonState]):
             raise InputError(f"no push of this scene can be steered. {reasons}")
         waits = 0.5 + latency if stale is None else stale
         prior = tuple(steering_of(planner.scene, option) for option in planner.usable)
-        around = Surroundings(planner.scene, planner.usable) if crowded else None
+        around = Surroundings(planner.scene, planner.usable) if among else None
         return cls(
             planner.scene, planner, prior, rate, tolerance, landings, learn, body, waits, surroundings=around
         )

@@ -8,6 +8,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from ...errors import InputError
 from ...geometry import Outline, rotate, transform
 from ...geometry.collision import Body, World
 from ...geometry.collision.world import WorldArrays
@@ -22,7 +23,7 @@ from .contact_car import ContactCar
 from .landings import Landing, fleet_of_contacts, free_path
 from .push_path import PushPath
 
-# Ways keep so much more than the scene's clearance, for noise, latency and another table; or less if there is none [m].
+# Paths keep so much more than the scene's clearance, for noise, latency and another table; less if there is none [m].
 MARGINS = (0.003, 0.002, 0.001, 0.0005)
 # A push stops before it comes nearer than this share of the margin of its path.
 GUARD = 0.4
@@ -57,6 +58,30 @@ class Thoughts(Generic[FoundT]):
         while len(self._done) <= number:
             self._done.append(next(self._parts))
         return self._done[number]
+
+
+def crowded(scene: Scene) -> bool:
+    """Whether a scene has bounds or obstacles.
+
+    Raises:
+        InputError: if it has, and fingers that are not lifted between pushes, or a goal of any angle.
+    """
+    if scene.workspace.bounds is None and not scene.workspace.obstacles:
+        return False
+    if scene.pusher.transit != "lift":
+        raise InputError(
+            "among bounds and obstacles the horizon controller lifts the fingers between pushes",
+            key="pusher.transit",
+            value=scene.pusher.transit,
+            hint="transit: lift, or follow the plan with the path controller.",
+        )
+    if np.isnan(scene.goal_pose[2]):
+        raise InputError(
+            "among bounds and obstacles the horizon controller needs a goal with an angle",
+            key="goal",
+            hint="Give the angle that the plan ends with.",
+        )
+    return True
 
 
 @dataclass(frozen=True, eq=False)

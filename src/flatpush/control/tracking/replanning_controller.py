@@ -16,7 +16,7 @@ from ...planning.path import Path
 from ...planning.query import Query
 from ...problem import Plan, Scene
 from ..horizon.landings import free_path
-from ..horizon.surroundings import GUARD, RoomyPath, Surroundings, Thoughts
+from ..horizon.surroundings import GUARD, RoomyPath, Surroundings, Thoughts, crowded
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
 from ..loop.frames import hand, mean_pose
 from ..loop.limits import Limits
@@ -99,8 +99,7 @@ class ReplanningController(AbstractController[ReplanningState]):
             rate, tolerance, landings: see the attributes.
 
         Raises:
-            InputError: for other than two fingers, things in the way of fingers that are not lifted, or no push that
-                can be steered.
+            InputError: for other than two fingers, no push that can be steered, or what surroundings.crowded refuses.
         """
         scene = plan.scene if isinstance(plan, Plan) else plan
         if scene.pusher.fingers != 2:
@@ -109,20 +108,7 @@ class ReplanningController(AbstractController[ReplanningState]):
             raise InputError(
                 "a tolerance is a distance and an angle, both positive", key="tolerance", value=tolerance
             )
-        crowded = _crowded(scene)
-        if crowded and scene.pusher.transit != "lift":
-            raise InputError(
-                "among bounds and obstacles the horizon controller lifts the fingers between pushes",
-                key="pusher.transit",
-                value=scene.pusher.transit,
-                hint="transit: lift, or follow the plan with the path controller.",
-            )
-        if crowded and np.isnan(scene.goal_pose[2]):
-            raise InputError(
-                "among bounds and obstacles the horizon controller needs a goal with an angle",
-                key="goal",
-                hint="Give the angle that the plan ends with.",
-            )
+        crowded(scene)  # refuses what is not done among things
         planner = Planner(scene)
         if not planner.usable:
             reasons = "; ".join(f"{name}: {why}" for name, why in planner.reasons.items())
@@ -139,7 +125,7 @@ class ReplanningController(AbstractController[ReplanningState]):
 
     @cached_property
     def surroundings(self) -> Surroundings | None:
-        return Surroundings(self.scene, self.planner.usable) if _crowded(self.scene) else None
+        return Surroundings(self.scene, self.planner.usable) if crowded(self.scene) else None
 
     def start(self, time: float = 0.0) -> ReplanningState:
         if not np.isfinite(time):
@@ -280,7 +266,3 @@ class ReplanningController(AbstractController[ReplanningState]):
             return (np.array([*compose(here, [-pusher.approach, 0.0, 0.0]), 0.0]),)
         away = self.surroundings.back(here, float(here[2]), self.limits.tips)
         return np.array([*away, 0.0]), np.array([*away, pusher.lift])
-
-
-def _crowded(scene: Scene) -> bool:
-    return scene.workspace.bounds is not None or bool(scene.workspace.obstacles)
