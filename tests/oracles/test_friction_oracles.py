@@ -103,7 +103,7 @@ def test_recorded_pushes_prefer_the_quartic(data_folder: Path) -> None:
 
 
 def test_cvxpy_finds_no_better_fit() -> None:
-    cp = pytest.importorskip("cvxpy", reason=extra("test"))
+    cp = pytest.importorskip("cvxpy", reason=extra("test-all"))
     rng = np.random.default_rng(4)
     support = Support.points(rng.uniform(-1, 1, (4, 2)), rng.uniform(0.2, 1, 4)).centred()
     V = rng.normal(size=(25, 3))
