@@ -299,9 +299,9 @@ def test_a_replay_notices_another_action_and_another_end():
         state, reward, *_ = env.step(action)
         states.append(state)
     whole = Episode(3, 0, np.array(states[:3]), np.array(actions), np.full(3, reward), -1, np.zeros(3), state)
-    assert not demonstrations.replays(env, whole)  # it leads nowhere
+    assert demonstrations.replays(env.task, [whole]) == [False]  # it leads nowhere
     other = replace(whole, actions=whole.actions * np.float32(0.9))
-    assert not demonstrations.replays(env, other)
+    assert demonstrations.replays(env.task, [other, whole]) == [False, False]
 
 
 @pytest.mark.slow

@@ -222,6 +222,23 @@ def patient(monkeypatch, interpreted_steps):
 COMPILED_ANYWAY = ["three feet", "ellipsoid"]
 
 
+@pytest.mark.parametrize("threads", [1, None])
+def test_runs_that_differ_forget_those_before_and_do_not_depend_on_threads(square, threads):
+    """What runs have of their own is kept for the next task, which has other coefficients or centres, or the same."""
+    plant, starts = Plant(square, [[0.0, 0.0]], 0.1), np.zeros((40, 3))
+    hand = np.column_stack([np.linspace(-1.2, 0.0, 200), np.full(200, 0.4), np.zeros(200)])
+    slippery, rough = np.linspace(0.0, 0.1, 40), np.linspace(0.5, 0.9, 40)
+    centres = np.tile([0.0, 0.1], (40, 1))
+    asked = [(slippery, None), (rough, None), (rough, centres), (slippery, None)]
+    ends = [plant.many(starts, hand, friction=mu, cofs=c, threads=threads).final for mu, c in asked]
+    np.testing.assert_array_equal(ends[0], ends[3])
+    for (mu, c), found in zip(asked, ends, strict=True):
+        fresh = Plant(square, [[0.0, 0.0]], 0.1)
+        one = fresh.many(starts[:1], hand, friction=mu[-1:], cofs=None if c is None else c[:1]).final
+        np.testing.assert_array_equal(found[-1], one[0])
+    assert len({tuple(np.round(found[-1], 6)) for found in ends}) == 3
+
+
 @pytest.mark.parametrize(
     "name",
     [*COMPILED_ANYWAY, *(pytest.param(n, marks=pytest.mark.slow) for n in ("polygon", "disc", "quartic"))],

@@ -10,6 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
+def _columns(*columns: Array) -> Array:
+    """As np.stack along a new last axis, of equal shapes, sooner."""
+    together = np.empty((*columns[0].shape, len(columns)))
+    for k, column in enumerate(columns):
+        together[..., k] = column
+    return together
+
+
 def wrap_angle(angle: ArrayLike) -> Array:
     """The same angle in (-π, π] [rad].
 
@@ -29,14 +37,14 @@ def cross(a: ArrayLike, b: ArrayLike) -> Array:
 def perpendicular(vector: ArrayLike) -> Array:
     """Plane vectors, shape (..., 2), turned by +90° (to their left)."""
     v = np.asarray(vector, dtype=float)
-    return np.stack([-v[..., 1], v[..., 0]], axis=-1)
+    return _columns(-v[..., 1], v[..., 0])
 
 
 def rotate(angle: ArrayLike, vector: ArrayLike) -> Array:
     """The plane vectors of shape (..., 2), turned counter-clockwise by the angle [rad]."""
     v = np.asarray(vector, dtype=float)
     c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1]], axis=-1)
+    return _columns(c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1])
 
 
 def transform(X_AB: ArrayLike, points_B: ArrayLike) -> Array:
@@ -49,13 +57,14 @@ def compose(X_AB: ArrayLike, X_BC: ArrayLike) -> Array:
     """X_AC = X_AB · X_BC, all (..., 3) [m, m, rad]. Angles are added, not wrapped: a path keeps its full turns."""
     A, B = np.asarray(X_AB, dtype=float), np.asarray(X_BC, dtype=float)
     xy = A[..., :2] + rotate(A[..., 2], B[..., :2])
-    return np.concatenate([xy, (A[..., 2] + B[..., 2])[..., None]], axis=-1)
+    return _columns(xy[..., 0], xy[..., 1], A[..., 2] + B[..., 2])
 
 
 def inverse(X_AB: ArrayLike) -> Array:
     """X_BA of X_AB, both (..., 3) [m, m, rad]."""
     X = np.asarray(X_AB, dtype=float)
-    return np.concatenate([-rotate(-X[..., 2], X[..., :2]), -X[..., 2:]], axis=-1)
+    xy = rotate(-X[..., 2], X[..., :2])
+    return _columns(-xy[..., 0], -xy[..., 1], -X[..., 2])
 
 
 def relative(X_WA: ArrayLike, X_WB: ArrayLike) -> Array:
@@ -76,7 +85,7 @@ def exp(twist: ArrayLike) -> Array:
     sine, versine = np.sinc(w / np.pi), half * np.sinc(half / np.pi) ** 2
     x = sine * V[..., 0] - versine * V[..., 1]
     y = versine * V[..., 0] + sine * V[..., 1]
-    return np.stack([x, y, w], axis=-1)
+    return _columns(x, y, w)
 
 
 def log(pose: ArrayLike) -> Array:
@@ -95,7 +104,7 @@ def log(pose: ArrayLike) -> Array:
     cot = np.cos(half) / np.where(np.abs(sine) < 1e-12, 1.0, sine)
     x = cot * X[..., 0] + half * X[..., 1]
     y = -half * X[..., 0] + cot * X[..., 1]
-    return np.stack([x, y, w], axis=-1)
+    return _columns(x, y, w)
 
 
 def velocity_at(twist: ArrayLike, points: ArrayLike) -> Array:

@@ -13,7 +13,7 @@ from ..geometry.pose import Array
 from ..problem import Object, Scene
 from ..simulation.noise import Noise
 from .policy import PushPolicy
-from .push import Observation, PushEnv
+from .push import Observation, PushEnv, PushVectorEnv
 from .task import Eyes, PushTask
 
 BLOCK = 25  # episodes that are tried with one object
@@ -83,9 +83,10 @@ def demonstrated(scene: Scene, seed: int, number: int) -> Block:
     for k in range(BLOCK):
         own = int(np.random.SeedSequence(seed, spawn_key=(number, k)).generate_state(1)[0])
         episode = _tried(env, policy, own, number)
-        if episode is not None and replays(env, episode):
+        if episode is not None:
             found.append(episode)
-    return Block(one, tuple(found), BLOCK)
+    again = replays(task, found)
+    return Block(one, tuple(e for e, good in zip(found, again, strict=True) if good), BLOCK)
 
 
 def blocks(
@@ -127,18 +128,29 @@ def _demonstrated(job: Job) -> Block:
     return demonstrated(*job)
 
 
-def replays(env: PushEnv, episode: Episode) -> bool:
-    """Whether an episode's actions lead through the same states to the goal again."""
-    state, info = env.reset(seed=episode.seed)
-    for k, action in enumerate(episode.actions):
-        if k == episode.disturbed:
-            state = env.displace(episode.displacement)
-        if np.max(np.abs(state - episode.states[k])) > SAME:
-            return False
-        state, _, ended, _, info = env.step(action)
-        if ended != (k == len(episode.actions) - 1):
-            return False
-    return bool(info["is_success"])
+def replays(task: PushTask, episodes: Sequence[Episode]) -> list[bool]:
+    """Whether the actions of each episode of a task lead through the same states to the goal again, all at once."""
+    if not episodes:
+        return []
+    envs = PushVectorEnv(task, len(episodes))
+    envs.reset(seed=[e.seed for e in episodes])
+    lengths = np.array([len(e.actions) for e in episodes])
+    good = np.ones(len(episodes), bool)
+    for k in range(lengths.max()):
+        runs = k < lengths
+        actions = np.zeros((len(episodes), *task.limits.shape))
+        for i in np.flatnonzero(runs):
+            if k == episodes[i].disturbed:
+                envs.knock(i, episodes[i].displacement)
+            actions[i] = episodes[i].actions[k]
+        seen = envs.observed()
+        for i in np.flatnonzero(runs):
+            good[i] &= np.max(np.abs(seen[i] - episodes[i].states[k])) <= SAME
+        _, ended, _ = envs.advance(actions, resting=~runs)
+        good[runs] &= ended[runs] == (k == lengths[runs] - 1)
+        last = k == lengths - 1
+        good[last] &= task.solved(envs.object, envs.goal)[last]
+    return good.tolist()
 
 
 def check_scenes(scenes: Sequence[Scene]) -> None:

@@ -1,6 +1,7 @@
 """A pushing task for learners: what is drawn for each episode, what is seen, and when it is solved."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -226,6 +227,11 @@ class PushTask:
         there = self.shape(goal)
         return float(there.intersection(self.shape(pose)).area / there.area)
 
+    @cached_property
+    def _shares(self) -> Array:
+        """Of the way of a decision at its poses, (substeps + 1, 1)."""
+        return np.linspace(0.0, 1.0, self.substeps + 1)[:, None]
+
     def moved(self, hand: Array, action: Array) -> Array:
         """Poses X_WE of the hand in a decision, shape (..., substeps + 1, 3).
 
@@ -242,5 +248,4 @@ class PushTask:
         low, high = self.box
         end = hand + np.concatenate([velocity, turn], axis=-1) / self.rate
         end[..., :2] = np.clip(end[..., :2], low, high)
-        share = np.linspace(0.0, 1.0, self.substeps + 1)[:, None]
-        return hand[..., None, :] + share * (end - hand)[..., None, :]
+        return hand[..., None, :] + self._shares * (end - hand)[..., None, :]

@@ -44,6 +44,8 @@ Codes = NDArray[np.integer]
 # Steps that this process interprets for a kind of surface before it compiles the kernels for it (a step takes about a
 # millisecond then, compiling takes longer than all of them), how many it has, and the kinds for which it has compiled.
 PATIENCE = 3000.0
+# Steps of the compiled kernels that are not worth a second thread (a step takes about ten microseconds).
+ALONE = 2000.0
 _interpreted: dict[type, float] = {}
 _ready: set[type] = set()
 
@@ -121,6 +123,7 @@ class Runner:
         self._own: RunArrays | None = None
         if self._surface is not None:
             self._own = run_arrays([self._surface], cof[None], np.array([friction]))
+        self._last: tuple[tuple[bytes, bytes], RunArrays | None] | None = None
         self._step: Callable[..., None] | None = None  # the kernel, with what it is given of the plant itself
 
     @cached_property
@@ -204,16 +207,15 @@ class Runner:
 
         own = self._own
         if task.surfaces is not None or task.frictions is not None or task.cofs is not None:
-            cofs = self._plain.cof[None] if task.cofs is None else task.cofs
-            mus = np.array([self._plain.friction]) if task.frictions is None else task.frictions
-            own = run_arrays(surfaces, cofs, mus)
+            own = self._varied(task, surfaces)
         if own is None:
             raise InputError("the surfaces of many runs are of one kind and size")
         n, (_, number, count, _) = len(task.starts), task.hands.shape
         ends = np.concatenate([task.starts, np.zeros((n, 2))], axis=1)
         way, out, seen, ran = task.hands.ravel(), done.poses.ravel(), done.seen.ravel(), ends.ravel()
-        workers = 1 if n == 1 else threads or os.cpu_count() or 1
-        size = max(1, -(-n // (4 * workers)))
+        few = n == 1 or n * self._work(task.hands) < ALONE
+        workers = 1 if few else threads or os.cpu_count() or 1
+        size = n if workers == 1 else -(-n // (4 * workers))
 
         def chunk(first: int) -> None:
             last = min(first + size, n)
@@ -229,6 +231,17 @@ class Runner:
             with ThreadPoolExecutor(workers) as pool:
                 list(pool.map(chunk, range(size, n, size)))
         done.ends[:] = ends.view(np.int64)[:, 3:]
+
+    def _varied(self, task: Task, surfaces: Sequence[SurfaceArrays]) -> RunArrays | None:
+        """What the kernel is given of runs that differ; kept for the next task, which often has the same."""
+        cofs = self._plain.cof[None] if task.cofs is None else task.cofs
+        mus = np.array([self._plain.friction]) if task.frictions is None else task.frictions
+        if task.surfaces is not None:
+            return run_arrays(surfaces, cofs, mus)
+        key = cofs.tobytes(), mus.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, run_arrays(surfaces, cofs, mus)
+        return self._last[1]
 
     def _interpreted(self, task: Task, surfaces: Sequence[SurfaceArrays], done: Done) -> None:
         room, count = scratch(), task.hands.shape[2]
