@@ -139,12 +139,12 @@ def replays(task: PushTask, episodes: Sequence[Episode]) -> list[bool]:
     for k in range(lengths.max()):
         runs = k < lengths
         actions = np.zeros((len(episodes), *task.limits.shape))
-        for i in np.flatnonzero(runs):
+        for i in np.flatnonzero(runs).tolist():
             if k == episodes[i].disturbed:
                 envs.knock(i, episodes[i].displacement)
             actions[i] = episodes[i].actions[k]
         seen = envs.observed()
-        for i in np.flatnonzero(runs):
+        for i in np.flatnonzero(runs).tolist():
             good[i] &= np.max(np.abs(seen[i] - episodes[i].states[k])) <= SAME
         _, ended, _ = envs.advance(actions, resting=~runs)
         good[runs] &= ended[runs] == (k == lengths[runs] - 1)
