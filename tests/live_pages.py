@@ -1,6 +1,7 @@
 """What tests of the live page say to it: scenes, files and requests."""
 
 import base64
+import json
 from multiprocessing import Pipe
 from pathlib import Path
 from threading import Thread
@@ -48,7 +49,15 @@ def told(requests, over):
     thread = Thread(target=run)
     thread.start()
     answers = []
-    until(lambda: answers.append(heard(here)) or over(answers), pause=0)
+
+    def hear():
+        client, kind, text = heard(here)
+        answer = json.loads(text)
+        assert answer["kind"] == kind
+        answers.append((client, answer.pop("number"), answer))
+        return over(answers)
+
+    until(hear, pause=0)
     here.close()
     thread.join(10)
     assert not thread.is_alive()

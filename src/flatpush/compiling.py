@@ -53,6 +53,11 @@ def listen(listener: Callable[[Work], None]) -> Callable[[], None]:
     return lambda: _listeners.remove(listener)
 
 
+def unheard() -> None:
+    """Nobody is told any more: who listened did so in the process that this one was forked from."""
+    _listeners.clear()
+
+
 def busy() -> bool:
     """Whether something is being compiled just now."""
     return _depth > 0

@@ -444,12 +444,11 @@ def test_numbers_that_are_none_are_refused_in_words_and_a_planner_that_dies_is_r
     page.js("document.getElementById('camera-delay').value = 0.1")
     page.press("c")
     page.wait("flatpush.feedback.live.times.length > 2")
-    command = ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(page.server.process.pid)]
-    children = subprocess.run(
+    command = ["ps", "-o", "pid=", "--ppid", str(page.server.process.pid)]
+    (worker,) = subprocess.run(
         command, capture_output=True, text=True, check=True, timeout=PATIENCE
-    ).stdout.splitlines()
-    (worker,) = (int(line.split()[0]) for line in children if "spawn_main" in line)
-    os.kill(worker, signal.SIGKILL)
+    ).stdout.split()
+    os.kill(int(worker), signal.SIGKILL)
     page.wait("!flatpush.feedback.on")
     assert page.text("followed") == "The planner ended, and with it this run."
     page.wait("!flatpush.busy && flatpush.answered > 1")

@@ -5,6 +5,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +20,14 @@ from ..planning.empty_table import direct_paths, refined_paths
 from ..planning.options import PushOption
 from ..planning.path import Path, pieces_of
 from ..planning.query import Query
-from ..planning.refine.problem import Candidate, Sequences
-from ..planning.refine.refine import LEAST
 from ..problem import CarCentres, Certificate, Plan, Scene
-from ..simulation import certify
 from ..steering.car import Car
+from .sketch import Sketch
 
+if TYPE_CHECKING:
+    from ..planning.refine.problem import Candidate
+
+Options = tuple[PushOption, ...]
 KEPT = 4  # planners that are remembered, of scenes that differ in more than start and goal
 
 
@@ -44,18 +47,19 @@ class LivePlanner:
         return next((plan for known, plan in self._stored if known == document), None)
 
     def answers(
-        self, document: Mapping[str, object], progress: Progress | None = None
-    ) -> Iterator[tuple[Plan, tuple[PushOption, ...]]]:
+        self, document: Mapping[str, object], progress: Progress | None = None, sketched: bool = False
+    ) -> Iterator[tuple[Plan | Sketch, Options]]:
         """Better and better plans of a scene document, with all pushes that were considered.
 
         The first one comes at once; where nothing is in the way it has not been certified, and its certificate
-        states no more than cost, duration and turning centres.
+        states no more than cost, duration and turning centres. With `sketched` a sketch of it comes before, where
+        there can be one.
 
         Raises:
             InputError: for a document that is no scene, or a start or a goal where something is in the way.
         """
         known = self._prepared(document)
-        yield from known.answers(known.moved(document), progress)
+        yield from known.answers(known.moved(document), progress, sketched)
 
     def listed(self, document: Mapping[str, object]) -> Scene:
         """A scene with its pushes listed; errors as in answers."""
@@ -89,26 +93,34 @@ class _Prepared:
         return replace(self._planner.scene, start=start, goal=goal)
 
     def answers(
-        self, scene: Scene, progress: Progress | None
-    ) -> Iterator[tuple[Plan, tuple[PushOption, ...]]]:
+        self, scene: Scene, progress: Progress | None, sketched: bool
+    ) -> Iterator[tuple[Plan | Sketch, Options]]:
         planner = self._planner.moved(scene.start, scene.goal, progress)
         options = (*planner.options, *planner.left_out)
         space = scene.workspace
         near = np.all(np.abs(scene.goal_error(scene.start_pose)) <= scene.planning.goal_tolerance)
         if space.bounds is not None or space.obstacles or near or not planner.usable or scene.planning.robust:
             for answer in planner.answers():
+                if sketched and answer.path is not None:
+                    sketched = False
+                    sketch = Sketch.of(planner, answer.path)
+                    if sketch is not None:
+                        yield sketch, options
                 yield answer.plan(), options
             return
-        for plan in self._free(planner):
+        for plan in self._free(planner, sketched):
             yield plan, options
 
-    def _free(self, planner: Planner) -> Iterator[Plan]:
+    def _free(self, planner: Planner, sketched: bool) -> Iterator[Plan | Sketch]:
         """With nothing in the way: from the last sequence and from every single push downhill, then by search."""
         scene, began = planner.scene, clock()
         best = np.inf
         complaint = ""
         for path in self._quick(planner):
             try:
+                sketch = Sketch.of(planner, path) if sketched else None
+                if sketch is not None:
+                    yield sketch
                 plan = _plan(planner, path, began)
             except FlatpushError as error:
                 complaint = str(error)
@@ -136,6 +148,9 @@ class _Prepared:
         scene, fleet = planner.scene, planner.fleet
         paths = direct_paths(fleet, scene.start_pose, planner.endpoints(scene))[:3]
         if self._seed is not None:
+            from ..planning.refine.problem import Sequences
+            from ..planning.refine.refine import LEAST
+
             goal = np.nan_to_num(scene.goal_pose)
             sequences = Sequences.of(Query(fleet, scene.start_pose, goal, free=scene.free_angle), LEAST)
             moved = sequences.following(self._seed)
@@ -154,6 +169,8 @@ class _Prepared:
 
     def _remember(self, path: Path) -> None:
         if len(path.pushes) > 1:
+            from ..planning.refine.problem import Candidate
+
             poses = np.array([path.start, *(end for *_, end in path.stretches)])
             self._seed = Candidate(path.cost, np.array(path.pushes, dtype=np.int64), poses)
 
@@ -174,6 +191,8 @@ def _plan(planner: Planner, path: Path, began: float) -> Plan:
 
 
 def _certified(plan: Plan) -> Plan:
+    from ..simulation import certify
+
     certificate = certify(plan.scene, plan.segments)
     return replace(plan, certificate=certificate, cost=certificate.cost, duration=certificate.duration)
 

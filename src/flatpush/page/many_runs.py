@@ -4,12 +4,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..geometry.pose import Array
 from ..problem import Plan
 from ..simulation import Noise
 from ..simulation.study import Chunk, Runs, run_chunk, together
 from ..view.table import MM
 from ..view.tube import tubes
+from .plain import plain
 from .values import number_of, whole_of
 
 FIRST, EACH = 10, 20  # runs that are told at once
@@ -50,12 +50,12 @@ def told(runs: Runs) -> dict[str, object]:
         for low, high, opacity in some:
             one, other = (way + side[:, None] * across for side in (low, high))
             ring = np.concatenate([one[::step], one[-1:], other[-1:], other[::-step]])
-            bands.append({"ring": _plain(ring, 2), "opacity": opacity})
+            bands.append({"ring": plain(ring, 2), "opacity": opacity})
     return {
         "kind": "runs",
         "done": len(runs),
         "bands": bands,
-        "ends": _plain(runs.final * [MM, MM, 1.0], 3),
+        "ends": plain(runs.final * [MM, MM, 1.0], 3),
         "stuck": runs.sticking.tolist(),
         "sticking": runs.sticking_share,
         "outcomes": {name: runs.outcomes.count(name) for name in dict.fromkeys(runs.outcomes)},
@@ -66,7 +66,3 @@ def told(runs: Runs) -> dict[str, object]:
             )
         ],
     }
-
-
-def _plain(values: Array, digits: int) -> list[object]:
-    return np.round(values + 0.0, digits).tolist()

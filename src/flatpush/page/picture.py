@@ -6,15 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..geometry import transform
-from ..geometry.pose import Array
 from ..planning.options import PushOption
 from ..problem import Certificate, Plan, Scene, SlideSegment
-from ..view import palette, words
+from ..view import words
 from ..view.page import plan_data
 from ..view.table import MM
 from ..view.trace import PushTrace, fingertips, trace_pushes
-
-COLOURS = 48  # pushes of one plan whose colours the page is told
+from .plain import plain
 
 
 def picture(plan: Plan, options: Sequence[PushOption] = ()) -> dict[str, object]:
@@ -35,7 +33,7 @@ def picture(plan: Plan, options: Sequence[PushOption] = ()) -> dict[str, object]
         "duration": plan.duration,
         "motion": plan_data(plan, traces),
         "traces": [_trace(trace, plan.scene) for trace in traces],
-        "goal": _mm(plan.goal_pose * [MM, MM, 1.0], 3),
+        "goal": plain(plan.goal_pose * [MM, MM, 1.0], 3),
         "proved": [] if certificate is None or math.isnan(certificate.goal_error[0]) else proved(certificate),
         "warnings": [] if certificate is None else list(certificate.warnings),
     }
@@ -67,19 +65,6 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
     return rows
 
 
-def vocabulary() -> dict[str, object]:
-    """Colours and words of the figures, for the page."""
-    return {
-        "pushes": [palette.push_colour(k) for k in range(COLOURS)],
-        "start": words.START,
-        "goal": words.GOAL,
-        "flat": words.FLAT_PATH,
-        "fingers": words.FINGERS,
-        "alone": words.ALONE,
-        "centre": words.CENTRE,
-    }
-
-
 def _trace(trace: PushTrace, scene: Scene) -> dict[str, object]:
     """A push, or a slide with the path of the centre of friction instead of that of the flat point."""
     slides, way = isinstance(trace.segment, SlideSegment), trace.flat_path
@@ -89,9 +74,9 @@ def _trace(trace: PushTrace, scene: Scene) -> dict[str, object]:
         "name": trace.segment.push,
         "label": words.push_label(trace.number, trace.segment, True),
         "word": words.word_of(trace.segment),
-        "ghosts": _mm(trace.marks * [MM, MM, 1.0], 4),
-        "tips": _mm(MM * fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2), 2),
-        "flat": None if way is None else _mm(MM * way, 2),
+        "ghosts": plain(trace.marks * [MM, MM, 1.0], 4),
+        "tips": plain(MM * fingertips(trace.pushers, trace.segment.fingers).reshape(-1, 2), 2),
+        "flat": None if way is None else plain(MM * way, 2),
         "slides": slides,
     }
 
@@ -100,14 +85,10 @@ def _place(option: PushOption) -> dict[str, object]:
     """Where a push is on the object, in O [mm], and why it is refused."""
     return {
         "name": option.push.name,
-        "at": _mm(MM * np.asarray(option.push.at.point), 3),
+        "at": plain(MM * np.asarray(option.push.at.point), 3),
         "refusal": option.refusal,
     }
 
 
 def _percent(value: float) -> str:
     return f"{100 * value:.0f} %" if math.isfinite(value) else "none"
-
-
-def _mm(values: Array, digits: int) -> list[object]:
-    return np.round(np.asarray(values, dtype=float) + 0.0, digits).tolist()

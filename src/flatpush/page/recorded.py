@@ -12,6 +12,7 @@ from ..geometry.pose import Array
 from ..problem import Plan, Push, Scene
 from ..view import palette
 from ..view.table import MM
+from .plain import plain
 
 LOGS = ".csv", ".mcap", ".txt"
 OBJECT, TOOL, SAID = "/flatpush/object", "/flatpush/tool", "/flatpush/state"
@@ -110,13 +111,13 @@ def _motion(rows: Array, names: list[str], scene: Scene, plan: Plan | None) -> d
         segments.append({
             "start": round(float(rows[k, 0]), 4), "push": push if low else None, "number": number + 1,
             "colour": palette.push_colour(max(number, 0)), "text": text.removeprefix(PUSH).removesuffix(")"),
-            "flat": None, "turns": [], "tips": _plain(MM * _fingers(scene, plan, push), 3),
+            "flat": None, "turns": [], "tips": plain(MM * _fingers(scene, plan, push), 3),
         })  # fmt: skip
     return {
-        "times": _plain(rows[:, 0], 4),
-        "object": _plain(rows[:, 1:4] * [MM, MM, 1.0], 4),
-        "pusher": _plain(rows[:, 4:7] * [MM, MM, 1.0], 4),
-        "height": _plain(MM * rows[:, 7], 2),
+        "times": plain(rows[:, 0], 4),
+        "object": plain(rows[:, 1:4] * [MM, MM, 1.0], 4),
+        "pusher": plain(rows[:, 4:7] * [MM, MM, 1.0], 4),
+        "height": plain(MM * rows[:, 7], 2),
         "segment": np.repeat(np.arange(len(first)), lengths).tolist(),
         "segments": segments,
     }
@@ -129,7 +130,3 @@ def _fingers(scene: Scene, plan: Plan | None, name: str) -> Array:
             return push.fingers
     half = 0.5 * scene.pusher.spacing
     return np.array([[0.0, half], [0.0, -half]] if scene.pusher.fingers == 2 else [[0.0, 0.0]])
-
-
-def _plain(values: Array, digits: int) -> list[object]:
-    return np.round(np.asarray(values, dtype=float) + 0.0, digits).tolist()

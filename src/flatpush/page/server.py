@@ -6,11 +6,12 @@ import json
 import multiprocessing
 import secrets
 import socket
+import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from itertools import count
 from multiprocessing.connection import Connection
@@ -18,12 +19,12 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from ..errors import FlatpushError, InputError, MissingExtra
-from ..problem import Plan
 from .options import Options
 from .worker import work
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
+    from pathlib import Path
 
     from starlette.applications import Starlette
     from starlette.requests import HTTPConnection, Request
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 3_000_000  # of a message
 RATE, BURST = 150.0, 300.0  # messages a second that a page may send, and at once
-KINDS = "plan", "file", "save", "hand", "mechanics", "follow", "on", "runs"
+KINDS = "plan", "drag", "file", "save", "hand", "mechanics", "follow", "on", "runs"
 TRIES = 30  # ports
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _IN_USE = (errno.EADDRINUSE, errno.EACCES)
@@ -46,48 +47,63 @@ HEADERS = {
 Message = Mapping[str, object]
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What the page is to show first: a scene, a plan or a log, and the scene or the plan of a log (opened.py)."""
+
+    file: "Path | None" = None
+    of: "Path | None" = None
+
+
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What the page shows first.
+    """What the page shows first, as opened.py has it.
 
     Attributes:
-        scene: a document as in_mm has it.
-        plan: of that scene, shown until something is changed.
-        runs: recorded ones, as recorded.py has them.
+        plan: pickled, by the process that plans for the one that takes its place: this one needs no part of it.
+        words: as vocabulary.py has them.
     """
 
     scene: Message
-    plan: Plan | None = None
-    runs: Sequence[Message] = ()
+    plan: bytes | None = None
+    runs: tuple[Message, ...] = ()
+    words: Message = field(default_factory=dict)
 
 
-def serve(shown: Shown, options: Options, told: Callable[[str], None]) -> None:
+def serve(asked: Asked, options: Options, told: Callable[[str], None]) -> None:
     """Serves the page until it is interrupted.
 
     Args:
-        shown: what the page shows first.
+        asked: what the page shows first.
         options: how it is served.
         told: called with lines for people: the link, and what went otherwise than asked.
 
     Raises:
         MissingExtra: without the extra `page`.
-        InputError: if no port is free or the address is not one of this machine.
+        InputError: if no port is free, the address is not one of this machine, or what is shown cannot be read.
         KeyboardInterrupt: when it is interrupted.
     """
-    planner = Planner(shown)  # first of all: it starts while the server does
+    planner = Planner(asked)  # first of all: it reads and plans while the server starts
+    try:
+        _serve(planner, options, told)
+    finally:
+        planner.close()
+
+
+def _serve(planner: "Planner", options: Options, told: Callable[[str], None]) -> None:
     try:
         import uvicorn
         from starlette.applications import Starlette as _  # noqa: F401
     except ImportError as error:
-        planner.close()
         raise MissingExtra('the page needs a web server: pip install "flatpush[page]"') from error
+    planner.read()
     listening = _listen(options, told)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(16)
     host = f"[{options.host}]" if ":" in options.host else options.host
     link = f"http://{host}:{port}/?token={token}"
     try:
-        app = application(shown, planner, token, {host, "localhost"} if _is_local(options.host) else set())
+        app = application(planner, token, {host, "localhost"} if _is_local(options.host) else set())
         server = uvicorn.Server(
             uvicorn.Config(
                 app,
@@ -105,11 +121,10 @@ def serve(shown: Shown, options: Options, told: Callable[[str], None]) -> None:
             threading.Thread(target=_open, args=(link, told), daemon=True).start()
         server.run(sockets=[listening])
     finally:
-        planner.close()
         listening.close()
 
 
-def application(shown: Shown, planner: "Planner", token: str, hosts: set[str]) -> "Starlette":
+def application(planner: "Planner", token: str, hosts: set[str]) -> "Starlette":
     """The application; a request shows the token, and its host and its origin are among the given ones (none: any)."""
     from starlette.applications import Starlette
     from starlette.responses import PlainTextResponse, Response
@@ -140,7 +155,7 @@ def application(shown: Shown, planner: "Planner", token: str, hosts: set[str]) -
             await socket.close(1008)
             return
         await socket.accept()
-        await Talk(socket, planner, next(clients), shown).run()
+        await Talk(socket, planner, next(clients)).run()
 
     @asynccontextmanager
     async def lifespan(_: "Starlette") -> "AsyncIterator[None]":
@@ -156,31 +171,57 @@ def application(shown: Shown, planner: "Planner", token: str, hosts: set[str]) -
 
 
 class Planner:
-    """The worker process and who waits for its answers."""
+    """The worker process and who waits for its answers, which are texts in JSON."""
 
-    def __init__(self, shown: Shown) -> None:
-        self._shown = shown
-        self._start()
-        self._waiting: dict[int, asyncio.Queue[Message]] = {}
+    def __init__(self, asked: Asked) -> None:
+        self._asked = asked
+        self.shown = Shown({})
+        self._waiting: dict[int, asyncio.Queue[str]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
-        self.compiling: Message | None = None
+        self.compiling = ""  # what is told while something is being compiled
+        self._start()
+        self._requests.send((0, 1, "open", {"file": asked.file, "of": asked.of}))
 
     def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._requests, theirs = context.Pipe()
-        self._process = context.Process(target=work, args=(theirs,), daemon=True)
+        """A fork of a process without threads is there at once; what takes the place of one that died is spawned."""
+        forked = sys.platform == "linux" and threading.active_count() == 1
+        context = multiprocessing.get_context("fork" if forked else "spawn")
+        self._requests, theirs = multiprocessing.Pipe()
+        ends = (theirs, self._requests) if forked else (theirs,)
+        self._process = context.Process(target=work, args=ends, daemon=True)  # type: ignore[attr-defined]
         self._process.start()
         theirs.close()
-        if self._shown.plan is not None:
-            kept = {"document": self._shown.scene, "plan": self._shown.plan}
-            self._requests.send((0, 1, "keep", kept))
+
+    def read(self) -> None:
+        """Waits for what is shown first.
+
+        Raises:
+            InputError: if it cannot be read.
+            FlatpushError: if the process that reads it ends.
+        """
+        kind = ""
+        while kind != "opened":
+            try:
+                _, kind, content = self._requests.recv()
+            except (EOFError, OSError):
+                raise FlatpushError(
+                    "the process that plans has ended before it could read the scene"
+                ) from None
+            if kind == "compiling":
+                self._note(content)
+            elif kind == "unreadable":
+                from .opened import opened
+
+                opened(self._asked.file, self._asked.of)  # tells why, as it told the other process
+                raise FlatpushError("the scene could not be read, and now it can; try again")
+        self.shown = Shown(*content)
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """From now on answers go to the queues of this loop."""
         self._loop = loop
         threading.Thread(target=self._listen, args=(self._requests,), daemon=True).start()
 
-    def join(self, client: int) -> "asyncio.Queue[Message]":
+    def join(self, client: int) -> "asyncio.Queue[str]":
         return self._waiting.setdefault(client, asyncio.Queue())
 
     def leave(self, client: int) -> None:
@@ -195,6 +236,9 @@ class Planner:
             self._start()
             assert self._loop is not None
             self.attach(self._loop)
+            if self.shown.plan is not None:
+                kept = {"document": self.shown.scene, "plan": self.shown.plan}
+                self._requests.send((0, 1, "keep", kept))
             self._requests.send((client, number, kind, value))
 
     def close(self) -> None:
@@ -207,46 +251,47 @@ class Planner:
     def _listen(self, requests: Connection) -> None:
         while True:
             try:
-                client, number, answer = requests.recv()
+                client, kind, text = requests.recv()
             except (EOFError, OSError):
-                answer, client, number = {"kind": "lost"}, 0, 0
+                client, kind, text = 0, "lost", json.dumps({"kind": "lost", "number": 0})
             if self._loop is None or self._loop.is_closed():
                 return
             try:
-                self._loop.call_soon_threadsafe(self._give, client, {**answer, "number": number})
+                self._loop.call_soon_threadsafe(self._give, client, kind, text)
             except RuntimeError:  # the loop has just been closed
                 return
-            if answer["kind"] == "lost":
+            if kind == "lost":
                 return
 
-    def _give(self, client: int, answer: Message) -> None:
-        if answer["kind"] == "compiling":
-            self.compiling = None if answer["over"] else answer
+    def _give(self, client: int, kind: str, text: str) -> None:
+        if kind == "compiling":
+            self._note(text)
         for known, queue in self._waiting.items():
             if client in (0, known):
-                queue.put_nowait(answer)
+                queue.put_nowait(text)
+
+    def _note(self, text: str) -> None:
+        self.compiling = "" if json.loads(text)["over"] else text
 
 
 class Talk:
     """One page that is open: its messages are checked here, and answered by the worker."""
 
-    def __init__(self, socket: "WebSocket", planner: Planner, client: int, shown: Shown) -> None:
-        self._socket, self._planner, self._client, self._shown = socket, planner, client, shown
+    def __init__(self, socket: "WebSocket", planner: Planner, client: int) -> None:
+        self._socket, self._planner, self._client = socket, planner, client
         self._left, self._last = BURST, time.monotonic()
 
     async def run(self) -> None:
         from starlette.websockets import WebSocketDisconnect
 
-        from .picture import vocabulary
-
         answers = self._planner.join(self._client)
         try:
-            shown = self._shown
+            shown = self._planner.shown
             await self._send(
-                {"kind": "hello", "scene": shown.scene, "runs": shown.runs, "words": vocabulary()}
+                {"kind": "hello", "scene": shown.scene, "runs": shown.runs, "words": shown.words}
             )
-            if self._planner.compiling is not None:
-                await self._send(self._planner.compiling)
+            if self._planner.compiling:
+                await self._socket.send_text(self._planner.compiling)
             sending = asyncio.create_task(self._forward(answers))
             try:
                 while True:
@@ -258,9 +303,9 @@ class Talk:
         finally:
             self._planner.leave(self._client)
 
-    async def _forward(self, answers: "asyncio.Queue[Message]") -> None:
+    async def _forward(self, answers: "asyncio.Queue[str]") -> None:
         while True:
-            await self._send(await answers.get())
+            await self._socket.send_text(await answers.get())
 
     async def _send(self, message: Message) -> None:
         await self._socket.send_text(json.dumps(message, separators=(",", ":"), ensure_ascii=False))

@@ -1,24 +1,31 @@
 """The process that plans, so that nothing a page asks for keeps the server waiting.
 
-Messages in: (client, number, kind, value). Messages out: (client, number, mapping); number 0 is for every client.
+Messages in: (client, number, kind, value). Messages out: (client, kind, JSON of the answer with its number); client 0
+is every client. What only the first plan needs is imported before it, and everything else when it is asked for.
 """
 
+import json
+import pickle
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from .. import compiling
 from ..errors import FlatpushError, InputError
-from ..problem import Plan, PushSegment
 
 if TYPE_CHECKING:
+    from ..problem import Plan
+    from .by_hand import ByHand
     from .feedback import Followed
+    from .live import LivePlanner
 
 PAUSE = 0.06  # without a newer request, after which better plans are sought [s]
 PATIENCE = 0.4  # for a first plan, after which a newer request comes first [s]
+SCENES = "plan", "drag"  # kinds of requests for a plan: while something is dragged a sketch of it comes first
 Request = tuple[int, int, str, Mapping[str, object]]
 Answer = Mapping[str, object]
 
@@ -35,11 +42,14 @@ class _Job:
     answers: Iterator[Answer]
 
 
-def work(requests: Connection) -> None:
-    """Answers requests until the other end is closed."""
+def work(requests: Connection, other: Connection | None = None) -> None:
+    """Answers requests until the other end is closed, which a process that was forked holds too."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends, and with it the connection
+    compiling.unheard()
+    if other is not None:
+        other.close()
     try:
         _Worker(requests).run()
     except (EOFError, OSError):
@@ -55,10 +65,19 @@ class _Worker:
         self._followed: dict[int, Followed] = {}
         self._going_on: dict[tuple[int, str], _Job] = {}
         self._waiting = set[int]()  # clients that have no answer yet
-        from .by_hand import ByHand
+        self._ready = False  # whether what is asked for later was imported
+
+    @cached_property
+    def _planner(self) -> "LivePlanner":
         from .live import LivePlanner
 
-        self._planner, self._hand = LivePlanner(), ByHand()
+        return LivePlanner()
+
+    @cached_property
+    def _hand(self) -> "ByHand":
+        from .by_hand import ByHand
+
+        return ByHand()
 
     def run(self) -> None:
         """Until the other end is closed, which raises EOFError or OSError."""
@@ -70,18 +89,21 @@ class _Worker:
 
     def _serve(self) -> None:
         if not self._new:
-            self._take(None if not self._going_on else PAUSE)
+            self._take(PAUSE if self._going_on or not self._ready else None)
         if self._new:
             self._begin(self._new.pop(next(iter(self._new))))
         elif self._going_on:
             self._go_on(next(reversed(self._going_on.values())))
+        else:
+            self._ready = True
+            _ = self._hand  # the first push by hand does not wait for its kernels
 
     def _take(self, wait: float | None) -> None:
         """Takes what has come, after waiting for it so long [s], or until something comes."""
         if self._requests.poll(wait):
             while True:
                 request: Request = self._requests.recv()
-                self._new[request[0], request[2]] = request
+                self._new[request[0], "plan" if request[2] in SCENES else request[2]] = request
                 if not self._requests.poll(0):
                     return
 
@@ -93,18 +115,15 @@ class _Worker:
             for job in ("plan", "runs"):
                 self._going_on.pop((client, job), None)
             return
-        if kind == "keep":
-            document, plan = value["document"], value["plan"]
-            assert isinstance(document, Mapping)
-            assert isinstance(plan, Plan)
-            self._planner.keep(document, plan)
+        if kind in ("open", "keep"):
+            self._open(value) if kind == "open" else self._keep(value)
             return
         if kind == "runs":
             self._end_search(client)
             self._going_on[client, kind] = _Job(client, number, kind, self._runs(client, value))
             return
-        if kind != "plan":
-            self._requests.send((client, number, self._answer(client, kind, value)))
+        if kind not in SCENES:
+            self._tell(client, number, self._answer(client, kind, value))
             return
         for job in ("plan", "runs"):
             self._going_on.pop((client, job), None)
@@ -118,7 +137,42 @@ class _Worker:
                 if self._new:
                     raise Superseded
 
-        self._step(_Job(client, number, kind, self._plans(client, value, hurry)))
+        self._step(_Job(client, number, "plan", self._plans(client, value, hurry, kind == "drag")))
+
+    def _tell(self, client: int, number: int, answer: Answer) -> None:
+        text = json.dumps({**answer, "number": number}, separators=(",", ":"), ensure_ascii=False)
+        self._requests.send((client, answer["kind"], text))
+
+    def _open(self, value: Mapping[str, object]) -> None:
+        """Reads what the page shows first, tells it, and plans it before a page has asked for it."""
+        from .opened import opened
+        from .vocabulary import vocabulary
+
+        try:
+            found = opened(value["file"], value["of"])  # type: ignore[arg-type]
+        except (FlatpushError, OSError):
+            self._requests.send((0, "unreadable", ""))
+            return
+        plan = None if found.plan is None else pickle.dumps(found.plan)
+        self._requests.send((0, "opened", (found.scene, plan, found.runs, vocabulary())))
+        if plan is not None:
+            self._keep({"document": found.scene, "plan": plan})
+
+        def hurry(*_: float) -> None:
+            self._take(0)
+            if self._new:
+                raise Superseded
+
+        try:
+            next(self._plans(0, found.scene, hurry, False), None)
+        except Superseded:
+            return
+
+    def _keep(self, value: Mapping[str, object]) -> None:
+        document, plan = value["document"], value["plan"]
+        assert isinstance(document, Mapping)
+        assert isinstance(plan, bytes)
+        self._planner.keep(document, pickle.loads(plan))
 
     def _answer(self, client: int, kind: str, value: Mapping[str, object]) -> Answer:
         """The answer to what is done at once."""
@@ -146,7 +200,7 @@ class _Worker:
         except FlatpushError as error:
             return {"kind": "refused" if kind in ("follow", "on") else "error", "reason": str(error)}
 
-    def _shown(self, client: int) -> Plan:
+    def _shown(self, client: int) -> "Plan":
         if client not in self._plan:
             raise InputError("there is no plan yet")
         return self._plan[client]
@@ -171,7 +225,7 @@ class _Worker:
         """What is tried is the plan that is shown: no better one is sought meanwhile."""
         job = self._going_on.pop((client, "plan"), None)
         if job is not None:
-            self._requests.send((client, job.number, {"kind": "done"}))
+            self._tell(client, job.number, {"kind": "done"})
 
     def _go_on(self, job: _Job) -> None:
         while self._step(job):
@@ -186,25 +240,25 @@ class _Worker:
         except Superseded:
             self._waiting.discard(job.client)
             self._going_on.pop((job.client, job.kind), None)
-            self._requests.send((job.client, job.number, {"kind": "superseded"}))
+            self._tell(job.client, job.number, {"kind": "superseded"})
             return False
         if job.kind == "plan":
             self._waiting.discard(job.client)
         if answer is None:
             self._going_on.pop((job.client, job.kind), None)
             if job.kind == "plan":
-                self._requests.send((job.client, job.number, {"kind": "done"}))
+                self._tell(job.client, job.number, {"kind": "done"})
             return False
-        self._requests.send((job.client, job.number, answer))
+        self._tell(job.client, job.number, answer)
         self._going_on[job.client, job.kind] = job
         return True
 
     def _plans(
-        self, client: int, document: Mapping[str, object], hurry: Callable[..., None]
+        self, client: int, document: Mapping[str, object], hurry: Callable[..., None], sketched: bool
     ) -> Iterator[Answer]:
-        from ..simulation import verify
         from .in_mm import refuse_files
         from .picture import picture
+        from .sketch import Sketch
 
         began = compiling.clock()
         try:
@@ -212,6 +266,8 @@ class _Worker:
             kept = self._planner.kept(document)
             if kept is not None:
                 self._plan[client] = kept
+                from ..simulation import verify
+
                 shown = {"kind": "plan", **picture(kept), "planning_time": None}
                 yield {**shown, "stored": "stored"}
                 known = () if kept.certificate is None else kept.certificate.warnings
@@ -219,11 +275,15 @@ class _Worker:
                 said = "stored, fails verification" if failed else "stored and verified"
                 yield {**shown, "stored": said, "warnings": [*known, *failed]}
                 return
-            for plan, options in self._planner.answers(document, hurry):
+            for plan, options in self._planner.answers(document, hurry, sketched):
                 spent = compiling.clock() - began
-                if plan.status == "solved":
-                    self._plan[client] = plan
-                yield {"kind": "plan", **picture(plan, options), "planning_time": spent}
+                if isinstance(plan, Sketch):
+                    shown = plan.picture()
+                else:
+                    shown = picture(plan, options)
+                    if plan.status == "solved":
+                        self._plan[client] = plan
+                yield {"kind": "plan", **shown, "planning_time": spent}
         except Superseded:
             raise
         except FlatpushError as error:
@@ -233,6 +293,7 @@ class _Worker:
             yield {"kind": "plan", "status": "refused", "reason": f"the planner failed: {error!r}"}
 
     def _mechanics(self, client: int, value: Mapping[str, object]) -> Answer:
+        from ..problem import PushSegment
         from .in_mm import refuse_files
         from .mechanics import mechanics
         from .values import scene_of, whole_of
@@ -247,16 +308,5 @@ class _Worker:
         return {**mechanics(self._planner.listed(scene), push, arcs), "segment": number}
 
     def _tell_compiling(self, work: compiling.Work) -> None:
-        self._requests.send(
-            (
-                0,
-                0,
-                {
-                    "kind": "compiling",
-                    "what": work.kernel,
-                    "done": work.done,
-                    "of": work.of,
-                    "over": work.over,
-                },
-            )
-        )
+        told = {"what": work.kernel, "done": work.done, "of": work.of, "over": work.over}
+        self._tell(0, 0, {"kind": "compiling", **told})

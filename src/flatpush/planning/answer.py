@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..problem import Plan
+from .path import Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,8 +16,10 @@ class Answer:
         cost: in the unit of the scene's cost; infinite where there is no plan.
         plan: makes the plan with its certificate, or the one that says why there is none.
         found: what the search tells about it, as in the plan's run entry.
+        path: of a plan of pushes that stick, before it is timed; None for others.
     """
 
     cost: float
     plan: Callable[[], Plan]
     found: dict[str, Any] = field(default_factory=dict)
+    path: Path | None = None

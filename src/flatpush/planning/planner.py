@@ -15,7 +15,6 @@ from ..geometry.collision import Body, World, pose_clearance
 from ..geometry.pose import Array, wrap_angle
 from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
-from ..simulation import certify
 from ..steering.fleet import Fleet
 from ..steering.free_heading import HEADINGS, cheapest_headings
 from ..steering.lengths import fleet_lengths
@@ -147,7 +146,7 @@ class Planner:
             )
             for found, segments in self._among.plans():
                 best, details = found.cost, found.details
-                yield Answer(best, partial(_solved, scene, segments, began, details), details)
+                yield Answer(best, partial(_solved, scene, segments, began, details), details, found.path)
             stopped_by = self._among.stopped_by
         else:
             for found in self._candidates(scene):
@@ -160,7 +159,7 @@ class Planner:
                     failed.setdefault(self.usable[found.path.pushes[0]].push.name, str(error))
                     continue
                 best, details = found.cost, found.details
-                yield Answer(best, partial(_solved, scene, segments, began, details), details)
+                yield Answer(best, partial(_solved, scene, segments, began, details), details, found.path)
         if stopped_by == "time_limit":
             details["stopped_by"] = stopped_by  # of the last answer, whose plan is yet to be made
         if self._slides_too:
@@ -298,6 +297,8 @@ def _listed(reasons: dict[str, str]) -> str:
 
 
 def _solved(scene: Scene, segments: Segments, began: float, found: dict[str, Any]) -> Plan:
+    from ..simulation import certify  # a first path is there before the judge is
+
     run = _run(began) | found
     certificate = certify(scene, segments)
     return Plan(

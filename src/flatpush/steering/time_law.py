@@ -108,7 +108,7 @@ class Trapezoid:
         k = max(n, int(np.ceil(count * 0.5)) if self.length <= self.acceleration * r * r * (1 + 1e-9) else n)
         ramps = np.linspace(0.0, r, k + 1)
         cruise = np.linspace(r, T - r, m + 1) if T - 2 * r > 1e-9 * T else np.array([])
-        t = np.unique(np.concatenate([ramps, cruise, T - ramps[::-1]]))
+        t = np.sort(np.concatenate([ramps, cruise, T - ramps[::-1]]))
         t = t[np.concatenate([[True], np.diff(t) > 1e-9 * T])]
         t[-1] = T
         fractions = self.travelled(t) / self.length

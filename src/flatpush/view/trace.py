@@ -10,6 +10,7 @@ from ..problem import Arc, Plan, PushSegment, Rollout, Scene, TableSegment, Tran
 from .timeline import Timeline, arc_starts
 
 MOST_MARKS = 36  # more outlines than this, and none of them can be told apart
+FLAT_STEP = np.deg2rad(2.0)  # between two points of the path of a flat point
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +46,16 @@ def trace_pushes(plan: Plan) -> tuple[PushTrace, ...]:
     reach = 0.5 * plan.scene.object.outline.size
     travels = [_travel(s.object, plan.scene.object.cof, reach) for s in plan.on_table]
     total = sum(float(t[-1]) for t in travels)
-    step = max(0.6 * reach, total / MOST_MARKS)
+    step = interval(reach, total)
     return tuple(
         _trace(plan, number, segment, travel, step)
         for number, (segment, travel) in enumerate(zip(plan.on_table, travels, strict=True))
     )
+
+
+def interval(reach: float, total: float) -> float:
+    """The travel from outline to outline [m] of an object that reaches so far [m], on a path of a total travel [m]."""
+    return max(0.6 * reach, total / MOST_MARKS)
 
 
 def fingertips(pusher: Array, fingers: Array) -> Array:
@@ -134,11 +140,11 @@ def _turning_centres(plan: Plan, segment: PushSegment) -> Array | None:
 
 
 def _path(segment: PushSegment, point: Array, poses: list[Array]) -> Array:
-    """The path of a point of the object along the arcs, from the twists themselves; one sample each 2°."""
+    """The path of a point of the object along the arcs, from the twists themselves; one sample each FLAT_STEP."""
     pieces = [transform(poses[0], point)[None]]
     for arc, pose in zip(segment.arcs, poses[:-1], strict=True):
         twist = arc.duration * np.asarray(arc.twist, dtype=float)
-        n = 1 + int(np.ceil(abs(twist[2]) / np.deg2rad(2.0)))
+        n = 1 + int(np.ceil(abs(twist[2]) / FLAT_STEP))
         s = np.arange(1, n + 1)[:, None] / n
         pieces.append(transform(compose(pose, exp(s * twist)), point))
     return np.concatenate(pieces)

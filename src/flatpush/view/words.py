@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..geometry import transform
-from ..problem import Plan, PushSegment, TableSegment
+from ..problem import Plan, PushSegment, Scene, TableSegment
 
 START, GOAL, BOTH = "start", "goal", "start = goal"
 FLAT_PATH = "path of the flat point"
@@ -47,8 +47,13 @@ def plan_subtitle(plan: Plan) -> str:
 
 def cost_text(plan: Plan) -> str:
     """The cost with the unit that belongs to it."""
-    of = {"flat": FLAT_PATH, "pusher": "path of the pusher", "time": "time"}[plan.scene.planning.cost]
-    number = f"{plan.cost:.1f} s" if plan.scene.planning.cost == "time" else f"{1e3 * plan.cost:.1f} mm"
+    return cost_words(plan.scene, plan.cost)
+
+
+def cost_words(scene: Scene, cost: float) -> str:
+    """A cost of a path in a scene with the unit that belongs to it."""
+    of = {"flat": FLAT_PATH, "pusher": "path of the pusher", "time": "time"}[scene.planning.cost]
+    number = f"{cost:.1f} s" if scene.planning.cost == "time" else f"{1e3 * cost:.1f} mm"
     return f"{number} ({of})"
 
 

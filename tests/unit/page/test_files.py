@@ -7,7 +7,6 @@ import pytest
 from tests.extras import extra
 from tests.live_pages import EXAMPLES, SCENE, dropped
 
-from flatpush.cli.view import _shown as shown_first
 from flatpush.documents import mapping_of, parse_scene
 from flatpush.errors import InputError
 from flatpush.execution.log import open_log
@@ -15,6 +14,7 @@ from flatpush.execution.robot import State, Target
 from flatpush.execution.run import Cycle
 from flatpush.page.files import read_dropped, saved
 from flatpush.page.in_mm import scene_in_mm
+from flatpush.page.opened import opened
 from flatpush.page.recorded import recorded
 
 
@@ -117,4 +117,4 @@ def test_a_log_needs_the_scene_of_its_object(tmp_path):
         (scene, log, "--scene belongs to a log"),
     ):
         with pytest.raises(InputError, match=said):
-            shown_first(file, of)
+            opened(file, of)

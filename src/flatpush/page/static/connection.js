@@ -1,6 +1,7 @@
 /* The connection to the server: the newest scene is asked for, and a lost connection is taken up again. */
 
 const PATIENCE = 450;     /* for an answer, before a newer scene is sent all the same [ms] */
+const APART = 12;         /* between two requests of one drag: a screen shows no more [ms] */
 const MOST = 2900000;     /* bytes of a message */
 
 export class Connection extends EventTarget {
@@ -33,9 +34,12 @@ export class Connection extends EventTarget {
 
   tell(name, detail) { this.dispatchEvent(new CustomEvent(name, { detail })); }
 
-  /* Asks for a plan of a scene; one that is asked for meanwhile takes its place. */
-  plan(scene, stamp) {
-    this.wanted = this.last = { scene, stamp };
+  /* Asks for a plan of a scene; one that is asked for meanwhile takes its place. Of a drag the path comes first, and
+     the plan once it rests. */
+  plan(scene, stamp, drag = false) {
+    const text = JSON.stringify(scene);
+    if (drag && this.last && this.last.text === text) return;   /* the pointer was heard before the page moved */
+    this.wanted = this.last = { scene, stamp, kind: drag ? "drag" : "plan", text };
     this.push();
   }
 
@@ -43,15 +47,15 @@ export class Connection extends EventTarget {
 
   push() {
     if (!this.wanted || !this.open) return;
-    const now = performance.now();
-    if (this.asked && now - this.asked.at < PATIENCE) {
+    const now = performance.now(), { scene, stamp, kind } = this.wanted;
+    const wait = this.asked ? PATIENCE : kind === "drag" ? APART : 0, gone = now - (this.asked || this.current || { at: -1e9 }).at;
+    if (gone < wait) {
       clearTimeout(this.timer);
-      this.timer = setTimeout(() => this.push(), PATIENCE - (now - this.asked.at) + 1);
+      this.timer = setTimeout(() => this.push(), wait - gone + 1);
       return;
     }
-    const { scene, stamp } = this.wanted;
     this.wanted = null;
-    this.asked = { number: this.send("plan", scene), at: now, stamp };
+    this.asked = { number: this.send(kind, scene), at: now, stamp };
     this.current = this.asked;
   }
 

@@ -1,7 +1,7 @@
 /* The page: a scene that is moved by hand, and the plan that follows it. */
 
 import { Connection } from "./connection.js";
-import { centroid, corners, find, html, isCircle, near, place, radians, rounded, turned, within } from "./geometry.js";
+import { centroid, corners, find, html, isCircle, near, place, radians, rounded, say, set, turned, within } from "./geometry.js";
 import { Hand } from "./hand.js";
 import { keep, linked, packed } from "./link.js";
 import { Mechanics } from "./mechanics.js";
@@ -11,8 +11,9 @@ import { Player } from "./player.js";
 import { Feedback, ManyRuns, Recordings, Run, csv } from "./runs.js";
 import { Table, newOutline } from "./table.js";
 
-const model = new Model(), table = new Table(model), player = new Player(model), panel = new Panel(model, player);
-const connection = new Connection(new URLSearchParams(location.search).get("token") || "");
+const model = new Model(), connection = new Connection(new URLSearchParams(location.search).get("token") || "");
+model.addEventListener("changed", ({ detail: { stamp, drag } }) => connection.plan(model.scene, stamp, drag));   /* it is planned while the page is drawn */
+const table = new Table(model, connection), player = new Player(model), panel = new Panel(model, player);
 const hand = table.hand = new Hand(model, table, connection);
 const mechanics = new Mechanics(model, table, connection, player);
 const run = table.run = new Run(model, player), feedback = table.feedback = new Feedback(model, connection, player, run), many = new ManyRuns(model, connection), recordings = new Recordings(model, run);
@@ -62,7 +63,10 @@ connection.addEventListener("done", () => { state.busy = false; });
 
 connection.addEventListener("plan", (event) => {
   const plan = event.detail, arrived = plan.stamp;
-  if (plan.status === "solved") {
+  if (plan.sketch) {
+    plan.traces.forEach((trace, k) => { trace.colour = state.words.pushes[k % state.words.pushes.length]; });
+    model.plan = plan;
+  } else if (plan.status === "solved") {
     plan.traces.forEach((trace, k) => { trace.colour = state.words.pushes[k % state.words.pushes.length]; });
     const { motion } = plan;
     plan.transits = motion.segments.map((segment, k) => ({ segment, k })).filter(({ segment }) => segment.push === null).map(({ k }) => motion.pusher.filter((_, i) => motion.segment[i] === k));
@@ -73,7 +77,7 @@ connection.addEventListener("plan", (event) => {
   if (starting) { starting = false; banner(""); }
   many.clear();
   panel.tell(plan);
-  player.take(plan.status === "solved" ? plan : null);
+  if (plan.sketch) player.sketch(plan.ends); else player.take(plan.status === "solved" ? plan : null);
   if (!table.touched && !state.answered) table.fit(); else table.drawPlan();
   if (model.scene.goal[2] === "free") table.drawScene();
   state.answered += 1;
@@ -108,11 +112,10 @@ function download(name, text) {
 
 /* ---- the scene has changed ---- */
 
-model.addEventListener("changed", (event) => {
+model.addEventListener("changed", () => {
   state.busy = true;
   if (feedback.on) { feedback.stop(); feedback.tell("The scene was changed, and the run ended."); }
   run.hide();
-  connection.plan(model.scene, event.detail.stamp);
   keep(model.scene);
   show();
 });
@@ -122,12 +125,12 @@ function show() {
   find("remove").disabled = !model.selected.startsWith("obstacle:");
   find("draw").classList.toggle("on", Boolean(table.sketch));
   find("push").classList.toggle("on", hand.on);
-  find("push").setAttribute("aria-pressed", String(hand.on));
+  set(find("push"), { "aria-pressed": String(hand.on) });
   find("here").hidden = !hand.on;
-  find("follow").textContent = feedback.on ? "Stop" : "Follow";
+  say(find("follow"), feedback.on ? "Stop" : "Follow");
   find("follow").classList.toggle("on", feedback.on);
   find("back").hidden = feedback.on || !run.motion;
-  find("play").textContent = feedback.on ? (feedback.paused ? "Go on" : "Pause") : player.playing ? "Pause" : "Play";
+  say(find("play"), feedback.on ? (feedback.paused ? "Go on" : "Pause") : player.playing ? "Pause" : "Play");
   if (feedback.on) find("play").disabled = false;
 }
 

@@ -28,7 +28,7 @@ export class Model extends EventTarget {
     if (JSON.stringify(next) === JSON.stringify(this.scene)) return;
     this.remember(gesture);
     this.scene = next;
-    this.changed(stamp);
+    this.changed(stamp, Boolean(gesture));
   }
 
   remember(gesture) {
@@ -56,7 +56,7 @@ export class Model extends EventTarget {
 
   get obstacles() { return (this.scene.workspace || {}).obstacles || []; }
 
-  changed(stamp = 0) { this.dispatchEvent(new CustomEvent("changed", { detail: { stamp } })); }
+  changed(stamp = 0, drag = false) { this.dispatchEvent(new CustomEvent("changed", { detail: { stamp, drag } })); }
 
   select(item) {
     if (item === this.selected) return;

@@ -107,6 +107,8 @@ export class Panel {
   /* The numbers of an answer. */
   tell(plan) {
     const solved = plan.status === "solved";
+    for (const id of ["title", "subtitle", "duration", "proved"]) find(id).classList.toggle("stale", Boolean(plan.sketch));
+    if (plan.sketch) { this.sketch(plan); return; }
     document.title = plan.title || `${this.model.scene.object.name}: no plan`;
     say(find("title"), document.title);
     say(find("subtitle"), solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0]);
@@ -124,6 +126,16 @@ export class Panel {
     else if (!solved) proved.replaceChildren();
     proved.classList.toggle("stale", solved && !plan.proved.length);
     if (!solved || plan.proved.length) find("warnings").replaceChildren(...(plan.warnings || []).map((text) => html("li", {}, text)));
+  }
+
+  /* Of a path while something is dragged: the cost and the pushes; what else is told stays meanwhile, pale. */
+  sketch(plan) {
+    say(find("cost"), plan.cost.split(" (")[0]);
+    say(find("count"), String(plan.traces.length));
+    say(find("spent"), number(1000 * plan.planning_time, 0) + " ms");
+    find("reason").hidden = true;
+    find("warnings").replaceChildren();
+    this.list(plan.traces);
   }
 
   /* The pushes, as buttons; while something is dragged they are mostly the same ones. */

@@ -16,10 +16,35 @@ export class Player {
 
   get duration() { return this.motion ? this.motion.times[this.motion.times.length - 1] : 0; }
 
-  /* Takes the motion of a plan; the time stays where it was. */
+  /* Takes the motion of a plan; the time stays where it was, and at the end if it was there. */
   take(plan) {
+    const ended = this.motion && this.now > 0 && this.now >= this.duration;
     this.planned = plan && plan.motion ? plan.motion : null;
-    if (!this.recorded) this.use(this.planned);
+    if (this.recorded) return;
+    if (ended && this.planned) this.now = this.planned.times[this.planned.times.length - 1];
+    this.use(this.planned);
+  }
+
+  /* While something is dragged only where it begins and ends is known; in between nothing is shown meanwhile. */
+  sketch([first, last]) {
+    if (this.recorded) return;
+    this.play(false);
+    const end = this.now <= 0 ? first : this.now >= this.duration ? last : null, moving = find("moving");
+    moving.style.display = end ? "" : "none";
+    if (!end) return;
+    this.put(end.object, end.pusher, end.height, end.tips);
+    if (this.moved) this.moved();
+  }
+
+  put(object, pusher, height, tips) {
+    set(find("object"), { transform: `translate(${object[0]} ${object[1]}) rotate(${object[2] / RAD})` });
+    const placed = pusher ? tips.map((tip) => place(pusher, tip)) : [];
+    find("pusher").classList.toggle("lifted", height > 1e-3);
+    document.querySelectorAll("#pusher .tip").forEach((disc, k) => {
+      disc.style.display = k < placed.length ? "" : "none";
+      if (k < placed.length) set(disc, { cx: placed[k][0], cy: placed[k][1] });
+    });
+    set(document.querySelector("#pusher .bar"), { d: placed.length > 1 ? path(placed, false) : "" });
   }
 
   /* Plays a run instead of the plan, from its end if it is under way; null: the plan again. */
@@ -87,14 +112,7 @@ export class Player {
     const pushing = segment && segment.push !== null;
     const turn = pushing ? segment.turns.find((part) => this.now < part.end) || segment.turns[segment.turns.length - 1] : null;
     find("table").style.setProperty("--now", pushing ? `color-mix(in oklab, ${segment.colour}, white var(--lift))` : "var(--ink)");
-    set(find("object"), { transform: `translate(${object[0]} ${object[1]}) rotate(${object[2] / RAD})` });
-    const tips = pusher && segment ? segment.tips.map((tip) => place(pusher, tip)) : [];
-    find("pusher").classList.toggle("lifted", height > 1e-3);
-    document.querySelectorAll("#pusher .tip").forEach((disc, k) => {
-      disc.style.display = k < tips.length ? "" : "none";
-      if (k < tips.length) set(disc, { cx: tips[k][0], cy: tips[k][1] });
-    });
-    set(document.querySelector("#pusher .bar"), { d: tips.length > 1 ? path(tips, false) : "" });
+    this.put(object, segment ? pusher : null, height, segment ? segment.tips : []);
     const flat = pushing && segment.flat ? place(object, segment.flat) : null;
     find("point").style.display = flat ? "" : "none";
     if (flat) set(find("point"), { cx: flat[0], cy: flat[1] });
@@ -118,7 +136,7 @@ export class Player {
 
   dispatch(segment) {
     const number = segment && segment.push !== null ? segment.number - 1 : -1;
-    document.querySelectorAll("#pushes button").forEach((button, k) => button.setAttribute("aria-current", String(k === number)));
+    document.querySelectorAll("#pushes button").forEach((button, k) => set(button, { "aria-current": String(k === number) }));
   }
 
   /* To the beginning of the push with this number, from 0. */
@@ -136,7 +154,7 @@ export class Player {
 
   play(yes) {
     this.playing = yes && this.duration > 0;
-    if (!this.live) find("play").textContent = this.playing ? "Pause" : "Play";
+    if (!this.live) say(find("play"), this.playing ? "Pause" : "Play");
     if (!this.playing) return;
     if (this.now >= this.duration) this.show(0);
     this.last = performance.now();

@@ -1,14 +1,24 @@
 /* The table as SVG: what is drawn, how it is looked at, and what the pointer does to it. */
 
-import { RAD, box, centroid, corners, find, isCircle, number, path, place, radians, rounded, set, size, svg, turned, within } from "./geometry.js";
+import { RAD, box, centroid, corners, find, isCircle, number, path, place, radians, rounded, say, set, size, svg, turned, within } from "./geometry.js";
 
 const REACH = 26;  /* of the handle that turns, beyond the outline [px] */
 const SNAP = 15;   /* degrees, with Shift */
+const ENDS = ["goal", "start"];
+
+/* So many children of a node; those that are there stay. */
+function children(node, count, make) {
+  while (node.children.length > count) node.lastChild.remove();
+  while (node.children.length < count) node.append(make());
+  return [...node.children];
+}
 
 export class Table {
-  constructor(model) {
-    this.model = model;
+  constructor(model, connection) {
+    this.model = model; this.connection = connection;
     this.node = find("table");
+    find("plan").append(svg("g"), svg("g"), svg("g"));   /* transits, pushes, their numbers */
+    find("names").append(...ENDS.map((name) => svg("text", { class: `name ${name}` }, name)));
     this.view = { x: 0, y: 0, unit: 1 };   /* middle of the screen [mm], mm to a pixel */
     this.pointers = new Map();
     this.drag = null;
@@ -23,6 +33,7 @@ export class Table {
     window.addEventListener("scroll", () => this.measure());
     this.node.addEventListener("pointerdown", (event) => this.down(event));
     this.node.addEventListener("pointermove", (event) => this.move(event));
+    this.node.addEventListener("pointerrawupdate", (event) => this.soon(event));
     this.node.addEventListener("pointerup", (event) => this.up(event));
     this.node.addEventListener("pointercancel", (event) => this.up(event));
     this.node.addEventListener("dblclick", (event) => this.double(event));
@@ -120,7 +131,7 @@ export class Table {
     const unit = this.view.unit, outline = scene.object.outline, shape = path(corners(outline));
     const middle = centroid(outline), reach = 0.5 * size(outline) + REACH * unit, mark = 0.18 * size(outline);
     const names = [];
-    for (const name of ["goal", "start"]) {
+    for (const name of ENDS) {
       const pose = radians(scene[name]), node = find(name), free = name === "goal" && scene.goal[2] === "free";
       const shown = free && this.model.plan && this.model.plan.goal ? this.model.plan.goal : pose;
       const angle = shown[2];
@@ -129,23 +140,25 @@ export class Table {
         "aria-label": `${name}, x ${number(pose[0], 1)} mm, y ${number(pose[1], 1)} mm, ` + (free ? "any angle" : `${number(scene[name][2], 1)}°`),
       });
       node.classList.toggle("selected", selected === name);
-      const parts = [svg("path", { class: "body", d: shape })];
-      if (!free) parts.push(
-        svg("path", { d: `M${middle[0]} ${middle[1]}h${mark}` }),
-        svg("line", { x1: middle[0] + mark, y1: middle[1], x2: middle[0] + reach, y2: middle[1] }),
-        svg("g", { class: "handle", "data-part": "turn" },
-          svg("circle", { class: "touch", cx: middle[0] + reach, cy: middle[1] }),
-          svg("circle", { class: "see", cx: middle[0] + reach, cy: middle[1] })));
-      node.replaceChildren(...parts);
+      const drawn = `${shape} ${free ? "" : reach}`;
+      if (node.dataset.drawn !== drawn) {   /* it moves by its transform alone */
+        node.dataset.drawn = drawn;
+        const parts = [svg("path", { class: "body", d: shape })];
+        if (!free) parts.push(
+          svg("path", { d: `M${middle[0]} ${middle[1]}h${mark}` }),
+          svg("line", { x1: middle[0] + mark, y1: middle[1], x2: middle[0] + reach, y2: middle[1] }),
+          svg("g", { class: "handle", "data-part": "turn" },
+            svg("circle", { class: "touch", cx: middle[0] + reach, cy: middle[1] }),
+            svg("circle", { class: "see", cx: middle[0] + reach, cy: middle[1] })));
+        node.replaceChildren(...parts);
+      }
       /* A name stands below its outline. */
       const low = corners(outline).map((p) => place(shown, p)).reduce((a, b) => (b[1] < a[1] ? b : a));
-      const [x] = place(shown, middle);
-      names.push(svg("text", { class: `name ${name}`, x, y: -(low[1] - 13 * unit) }, name));
+      names.push([place(shown, middle)[0], 13 * unit - low[1]]);
     }
     const [one, other] = names;
-    if (Math.hypot(one.getAttribute("x") - other.getAttribute("x"), one.getAttribute("y") - other.getAttribute("y")) < 16 * unit)
-      set(other, { y: Number(one.getAttribute("y")) + 17 * unit });
-    find("names").replaceChildren(...names);
+    if (Math.hypot(one[0] - other[0], one[1] - other[1]) < 16 * unit) other[1] = one[1] + 17 * unit;
+    [...find("names").children].forEach((node, k) => set(node, { x: names[k][0], y: names[k][1] }));
     this.drawObstacles();
     const bounds = (scene.workspace || {}).bounds;
     find("bounds").style.display = bounds ? "" : "none";
@@ -183,25 +196,26 @@ export class Table {
     const { plan, scene, selected } = this.model, group = find("plan"), unit = this.view.unit;
     if (!scene) return;
     const outline = corners(scene.object.outline), shape = path(outline), tip = Math.max(scene.pusher.tip_radius, 1.3 * unit);
-    const parts = [], taken = [];
-    const traces = plan && plan.traces ? plan.traces : [];
-    for (const way of plan && plan.transits ? plan.transits : []) parts.push(svg("path", { class: "transit", d: path(way, false) }));
-    traces.forEach((trace, k) => {
-      const node = svg("g", { class: "push" + (selected === `push:${k}` ? " chosen" : ""), style: `--c:${trace.colour}` });
-      for (const [x, y, angle] of trace.ghosts) node.append(svg("path", { class: "ghost", d: shape, transform: `translate(${x} ${y}) rotate(${angle / RAD})` }));
-      if (trace.tips.length) node.append(svg("path", { class: "trail", d: trace.tips.map(([x, y]) => `M${x - tip} ${y}a${tip} ${tip} 0 1 0 ${2 * tip} 0a${tip} ${tip} 0 1 0 ${-2 * tip} 0`).join("") }));
-      if (trace.flat) node.append(svg("path", { class: trace.slides ? "flat slide" : "flat", d: path(trace.flat, false) }));
-      parts.push(node);
+    const taken = [], traces = plan && plan.traces ? plan.traces : [], transits = plan && plan.transits ? plan.transits : [];
+    const [ways, pushes, numbers] = group.children;
+    children(ways, transits.length, () => svg("path", { class: "transit" })).forEach((node, k) => set(node, { d: path(transits[k], false) }));
+    children(pushes, traces.length, () => svg("g", {}, svg("g"), svg("path", { class: "trail" }), svg("path"))).forEach((node, k) => {
+      const trace = traces[k], [ghosts, trail, flat] = node.children;
+      set(node, { class: "push" + (selected === `push:${k}` ? " chosen" : ""), style: `--c:${trace.colour}` });
+      children(ghosts, trace.ghosts.length, () => svg("path", { class: "ghost" })).forEach((ghost, i) => {
+        const [x, y, angle] = trace.ghosts[i];
+        set(ghost, { d: shape, transform: `translate(${x} ${y}) rotate(${angle / RAD})` });
+      });
+      set(trail, { d: trace.tips.map(([x, y]) => `M${x - tip} ${y}a${tip} ${tip} 0 1 0 ${2 * tip} 0a${tip} ${tip} 0 1 0 ${-2 * tip} 0`).join("") });
+      set(flat, { class: trace.slides ? "flat slide" : "flat", d: trace.flat ? path(trace.flat, false) : "" });
     });
-    traces.forEach((trace, k) => {
-      const way = trace.flat || trace.ghosts, node = svg("g", { class: "push number", "data-item": `push:${k}`, style: `--c:${trace.colour}` });
+    children(numbers, traces.length, () => svg("g", { class: "push number" }, svg("circle"), svg("text", { transform: "scale(1 -1)" }))).forEach((node, k) => {
+      const trace = traces[k], way = trace.flat || trace.ghosts;
       const free = way.find((p, i) => i > 0 && taken.every((q) => Math.hypot(p[0] - q[0], p[1] - q[1]) >= 21 * unit)) || way[0];
       taken.push(free);
-      set(node, { transform: `translate(${free[0]} ${free[1]})` });
-      node.append(svg("circle"), svg("text", { transform: "scale(1 -1)" }, String(k + 1)));
-      parts.push(node);
+      set(node, { "data-item": `push:${k}`, style: `--c:${trace.colour}`, transform: `translate(${free[0]} ${free[1]})` });
+      say(node.lastChild, String(k + 1));
     });
-    group.replaceChildren(...parts);
     /* Where pushes are refused, at the start. */
     const d = 5 * unit, refused = plan ? (plan.places || []).filter((spot) => spot.refusal) : [];
     const pose = radians(scene.start);
@@ -277,6 +291,15 @@ export class Table {
     this.touched = true;
     const to = this.at(event), shift = [to[0] - drag.from[0], to[1] - drag.from[1]];
     this.model.change((scene) => this.dragged(scene, drag, to, shift, event.shiftKey), drag.gesture, event.timeStamp);
+  }
+
+  /* Where the pointer goes is known before the next frame: the plan for it is asked for at once. */
+  soon(event) {
+    const { drag, connection } = this;
+    if (!drag || drag.kind !== "item" || !drag.moved || connection.asked) return;
+    const to = this.at(event), scene = structuredClone(this.model.scene);
+    this.dragged(scene, drag, to, [to[0] - drag.from[0], to[1] - drag.from[1]], event.shiftKey);
+    connection.plan(scene, event.timeStamp, true);
   }
 
   dragged(scene, drag, to, [dx, dy], snap) {
