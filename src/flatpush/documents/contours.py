@@ -309,6 +309,14 @@ def _check_alone(
     if flawed is not None:
         raise InputError(f"{flawed.place}: {flawed.refusal}", source=source, hint=_REDRAW)
     if outside:
+        shapes = [Polygon(c.points).buffer(FLATNESS * extent(c.points)) for c in outside]
+        outside = [
+            c
+            for c in outside
+            if not any(
+                d is not c and s.covers(LineString(c.points)) for d, s in zip(outside, shapes, strict=True)
+            )
+        ]
         raise InputError(
             f"the drawing has {len(outside) + 1} outer contours, not one:"
             f" {'; '.join(c.place for c in [outer, *outside][:4])}",

@@ -1,8 +1,10 @@
 """Reads what is visible in the model space of a DXF drawing."""
 
+import codecs
 import os
 import re
 from collections.abc import Callable, Iterable
+from io import StringIO
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,11 +44,13 @@ _LINE_TYPES = {
     "a phantom line": ("phantom", "divide", "border", "acad_iso05", "acad_iso09", "acad_iso12"),
     "a hidden line": ("hidden", "dashed", "dot", "acad_iso02", "acad_iso03", "acad_iso07"),
 }  # fmt: skip
+_MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 _MOST_NESTED, _MOST_ENTITIES = 8, 200_000
 # A variable of the header begins with 9; the same word in a text does not declare anything.
 _SET = re.compile(rb"^[ \t]*9[ \t]*\r?\n[ \t]*\$INSUNITS[ \t]*\r?$|\x09\x00?\$INSUNITS\x00", re.M)
 _DECLARED = re.compile(rb"\s*70\s*\r?\n\s*(-?[0-9]+)")
 _DASH = 49  # group of a line type: length of a dash, negative for a gap
+_TILTED = 1e-4  # slope of a plane from which on lengths in it are not what is seen
 _FRAME_POINT = 16  # flag of a vertex that only controls the curve of its POLYLINE
 
 
@@ -66,7 +70,13 @@ def read_dxf(path: str | os.PathLike[str]) -> Drawing:
     hint = "Is it the right file, and is it complete?"
     content = read_bytes(path)
     try:
-        document = ezdxf.readfile(source)
+        marked = next((mark for mark in _MARKS if content.startswith(mark)), b"")
+        if marked:  # by which text says how it is encoded; ezdxf does not know it
+            text = content[len(marked) :].decode(_MARKS[marked])
+            content = text.encode()
+            document = ezdxf.read(StringIO("\n".join(text.splitlines()) + "\n"))
+        else:
+            document = ezdxf.readfile(source)
         if document.dxfversion <= "AC1009" and b"AcDbEntity" in content:
             raise InputError(  # ezdxf then takes all layers for 0
                 "the drawing says that it is of R12, or nothing ($ACADVER), and has entities of later versions",
@@ -151,6 +161,8 @@ class _Reader:
             kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh)
         ):
             self.drawing.unreadable.append(Unreadable(place, "this kind of entity is not read", names))
+        elif flaw := _flaw(entity):
+            self.drawing.unreadable.append(Unreadable(place, flaw, names))
         else:
             points = _points(entity)
             if points is not None:
@@ -244,6 +256,20 @@ class _Reader:
                         f"what is on the sheet {layout.name!r}", "in paper space; only model space is read"
                     )
                 )
+
+
+def _flaw(entity: "DXFEntity") -> str:
+    """Why programs differ about what a line is; empty if they do not."""
+    kind, get = entity.dxftype(), entity.dxf.get
+    if entity.dxf.is_supported("extrusion"):
+        x, y, z = get("extrusion", (0.0, 0.0, 1.0))
+        if np.hypot(x, y) > _TILTED * abs(z):
+            return "it lies in a tilted plane, and is seen foreshortened"
+    if kind in ("ARC", "ELLIPSE"):
+        first, last = ("start_angle", "end_angle") if kind == "ARC" else ("start_param", "end_param")
+        if get(first, 0.0) == get(last, 2 * np.pi):
+            return "it begins and ends at the same angle, which is nothing to some programs and a full turn to others"
+    return ""
 
 
 def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:

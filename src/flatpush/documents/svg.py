@@ -14,11 +14,12 @@ from .drawing import FLATNESS, WIDE, Curve, Drawing, LeftOut, Unreadable, extent
 from .reading import read_bytes
 from .svg_path import Segment, traced
 from .svg_shapes import NUMBERS, SHAPES, Sizes
-from .svg_style import Element, Rule, Unsupported, sheet_rules, style_of
+from .svg_style import MASKS, Element, Rule, Unsupported, sheet_rules, style_of
 from .svg_units import (
     LENGTH,
     NO_TURN,
     PX,
+    UNITS,
     fitted,
     joined,
     number,
@@ -35,6 +36,7 @@ _CONTAINERS = ("g", "a", "svg", "switch")
 _ASIDE = {"text": "text", "flowRoot": "text", "image": "a picture"}
 _MOVING = ("animate", "animateTransform", "animateMotion", "set")
 _MOST_NESTED, _MOST_ELEMENTS, _MOST_REUSED = 60, 200_000, 20_000
+_OTHER_MEDIA = {"print", "speech", "aural", "braille", "embossed", "handheld", "projection", "tty", "tv"}
 _WHITE = ("white", "#fff", "#ffffff", "rgb(255,255,255)")
 
 
@@ -116,11 +118,17 @@ class _Reader:
             if "id" in element.attributes:
                 self.ids.setdefault(element.attributes["id"], element)
             waiting += reversed(element.children)
-            if element.tag == "style" and element.attributes.get("media", "all") in ("all", "screen", ""):
+            if element.tag == "style":
                 try:
-                    self.rules += sheet_rules(element.text, len(self.rules))
+                    self.sheet(element)
                 except Unsupported as reason:
                     raise InputError(f"{element.place}: {reason}", hint=_PLAIN) from None
+        style = style_of(self.root, self.rules, {})
+        for key in ("width", "height"):
+            size = LENGTH.fullmatch(style.get(key, ""))
+            if size and size[2].lower() in UNITS and style[key] != self.root.attributes.get(key):
+                rule = f"the {key} of the page is in its style, which programs read differently"
+                raise InputError(rule, value=style[key], hint="Write it as an attribute of <svg>.")
         self.drawing.unit = page_unit(self.root)
         box = view_box(self.root)
         sides = [number(self.root.attributes.get(key, "")) for key in ("width", "height")]
@@ -142,6 +150,17 @@ class _Reader:
                 )
             self.drawing.unit = PX
         return self.drawing
+
+    def sheet(self, element: Element) -> None:
+        """Reads a style sheet that holds on screens; others are passed over."""
+        if element.attributes.get("type", "").strip().lower() not in ("", "text/css"):
+            return
+        rules = sheet_rules(element.text, len(self.rules))
+        media = {word.strip().lower() for word in element.attributes.get("media", "").split(",")}
+        if media & {"", "all", "screen"}:
+            self.rules += rules
+        elif rules and not media <= _OTHER_MEDIA:
+            raise Unsupported(f"whether it holds depends on the screen ({element.attributes['media']!r})")
 
     def visit(self, element: Element, state: _State, page: bool = False) -> None:
         self.count += 1
@@ -208,9 +227,10 @@ class _Reader:
         elif "opacity" in style and _portion(style["opacity"]) <= 0:
             hidden = "hidden (opacity: 0)"
         refusal = state.refusal
-        clip, mask = style.get("clip-path", ""), style.get("mask", "")
-        if mask.lower() not in ("", "none"):
-            refusal = f"it is masked ({mask})"
+        clip = style.get("clip-path", "")
+        masks = [style[key] for key in MASKS if style.get(key, "").lower() not in ("", "none")]
+        if masks:
+            refusal = f"it is masked ({masks[0]})"
         if style.get("filter", "").lower() not in ("", "none"):
             refusal = f"it has a filter ({style['filter']})"
         moving = next((child.tag for child in element.children if child.tag in _MOVING), "")
@@ -270,7 +290,8 @@ class _Reader:
             return
         sides = {k: v for k, v in element.attributes.items() if k in ("width", "height")}
         inner = {**target.attributes, **sides}
-        if away := next((key for key in ("refX", "refY") if target.attributes.get(key, "0") != "0"), ""):
+        places = ("refX", "refY", "x", "y") if target.tag == "symbol" else ()
+        if away := next((key for key in places if target.attributes.get(key, "0") != "0"), ""):
             self.unreadable(element, state, f"the {away} of its symbol is not read")
             return
         style = style_of(target, self.rules, state.style)
@@ -372,13 +393,31 @@ class _Reader:
                     )
 
     def fallbacks(self, style: Mapping[str, str]) -> dict[str, str]:
-        """What is painted instead of a gradient or pattern that is not in the drawing: nothing if not said."""
-        found = {kind: _URL.match(style.get(kind, "")) for kind in ("fill", "stroke")}
-        return {
-            kind: style[kind][match.end() :].strip() or "none"
-            for kind, match in found.items()
-            if match and match[1].startswith("#") and match[1][1:] not in self.ids
-        }
+        """What is painted instead of a gradient or pattern that is not in the drawing or shows nothing: nothing if not
+        said."""
+        found: dict[str, str] = {}
+        for kind in ("fill", "stroke"):
+            match = _URL.match(style.get(kind, ""))
+            if match and match[1].startswith("#"):
+                paint = self.ids.get(match[1][1:])
+                if paint is None:
+                    found[kind] = style[kind][match.end() :].strip() or "none"
+                elif not self.paints(paint):
+                    found[kind] = "none"
+        return found
+
+    def paints(self, paint: Element) -> bool:
+        """Whether a gradient or pattern shows anything; its stops or contents may be those of another."""
+        gradient, seen = paint.tag.endswith("Gradient"), set[int]()
+        while id(paint) not in seen:
+            seen.add(id(paint))
+            parts = [child for child in paint.children if child.tag == "stop" or not gradient]
+            if parts:
+                stops = [style_of(part, self.rules, {}) for part in parts] if gradient else []
+                return not gradient or any(_painted(stop, "stop", "black", "color") for stop in stops)
+            href = paint.attributes.get("href", paint.attributes.get("xlink:href", ""))
+            paint = self.ids.get(href[1:], paint)
+        return False
 
     def is_paper(self, element: Element, state: _State) -> bool:
         """Whether a shape is a white rectangle that covers the page."""
@@ -445,8 +484,10 @@ def _width(text: str) -> float:
     return float(match[1]) if match else 1.0
 
 
-def _painted(style: Mapping[str, str], kind: str, default: str) -> bool:
-    colour = (style.get(kind, "") or default).replace(" ", "").lower()
+def _painted(style: Mapping[str, str], kind: str, default: str, name: str = "") -> bool:
+    colour = (style.get(f"{kind}-{name}" if name else kind, "") or default).replace(" ", "").lower()
+    if colour == "currentcolor":
+        colour = style.get("color", "black").replace(" ", "").lower()
     if colour in ("none", "transparent") or _portion(style.get(f"{kind}-opacity", "1") or "1") <= 0:
         return False
     if re.fullmatch(r"#(...0|......00)", colour):

@@ -10,8 +10,8 @@ from ..geometry.pose import Array, cross
 from .drawing import flattened
 
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])")
-_NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
-_FLAG = re.compile(r"[\s,]*([01])")
+_NUMBER = re.compile(r"\s*,?\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
+_FLAG = re.compile(r"\s*,?\s*([01])")
 _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
 _NO_ROOM = 1e-12  # part of its radii that the ends of an arc may lie outside its ellipse without growing it
 

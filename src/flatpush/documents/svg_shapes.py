@@ -9,7 +9,7 @@ import numpy as np
 from .drawing import extent
 from .svg_path import EllipticArc, Segment, Straight, subpaths
 from .svg_style import GEOMETRY, Element
-from .svg_units import LENGTH, NUMBER, PX, UNITS
+from .svg_units import LENGTH, NUMBER, PX, TWO_COMMAS, UNITS
 
 NUMBERS = re.compile(NUMBER)
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -41,7 +41,7 @@ class Sizes:
             return subpaths("" if data.strip().lower() == "none" else data)
         if tag in ("polyline", "polygon"):
             text = element.attributes.get("points", "")
-            if NUMBERS.sub("", text).strip(" \t\r\n\f,"):
+            if NUMBERS.sub("", text).strip(" \t\r\n\f,") or TWO_COMMAS.search(text):
                 raise ValueError(f"its points are no numbers ({text[:40]!r})")
             numbers = [float(x) for x in NUMBERS.findall(text)]
             if len(numbers) % 2 or not np.all(np.isfinite(numbers)):

@@ -5,13 +5,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 INHERITED = (
-    "visibility", "fill", "stroke", "fill-opacity", "stroke-opacity", "stroke-width", "stroke-dasharray",
+    "visibility", "color", "fill", "stroke", "fill-opacity", "stroke-opacity", "stroke-width", "stroke-dasharray",
     "marker-start", "marker-mid", "marker-end",
 )  # fmt: skip
 # Properties that tell what is seen, and where. A rule of a style sheet that touches none of these is not read.
 GEOMETRY = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "d")
+MASKS = ("mask", "mask-image", "-webkit-mask", "-webkit-mask-image")
 USED = (
-    *INHERITED, *GEOMETRY, "display", "opacity", "clip-path", "mask", "filter", "marker", "overflow",
+    *INHERITED, *GEOMETRY, *MASKS, "display", "opacity", "clip-path", "filter", "marker", "overflow", "stop-opacity",
+    "stop-color",
     "transform", "transform-origin", "transform-box", "translate", "rotate", "scale", "offset-path",
 )  # fmt: skip
 # Those that an attribute of the same name does not set, as it means another thing or nothing.
@@ -88,10 +90,12 @@ def style_of(element: Element, rules: list[Rule], parent: Mapping[str, str]) -> 
 def declarations(text: str) -> dict[str, tuple[str, bool]]:
     """The declarations that tell what is seen, each a value and whether it is important."""
     found: dict[str, tuple[str, bool]] = {}
-    for part in _COMMENT.sub("", text).split(";"):
+    for part in _veiled(text).split(";"):
         name, colon, value = part.partition(":")
-        name = name.strip().lower()
+        name, value = name.strip().lower(), value.translate(_UNVEIL)
         if not colon or name not in USED:
+            if name == "all":
+                raise Unsupported(f"its style has all: {value.strip()}")
             continue
         value, mark, word = value.partition("!")
         important = bool(mark) and word.strip().lower() == "important"
@@ -108,7 +112,7 @@ def sheet_rules(text: str, before: int) -> list[Rule]:
         Unsupported: where it cannot be told what a rule that matters applies to.
     """
     rules: list[Rule] = []
-    text = _COMMENT.sub("", text).replace("<!--", "").replace("-->", "")
+    text = _veiled(text).replace("<!--", "").replace("-->", "")
     for prelude, body in _blocks(text):
         if prelude.startswith("@"):
             word = prelude.split()[0].split("(")[0]
@@ -121,6 +125,8 @@ def sheet_rules(text: str, before: int) -> list[Rule]:
         if not wanted:
             continue
         for selector in prelude.split(","):
+            if _NEVER.search(selector) and not set("()") & set(selector):
+                continue
             steps = _selector(selector)
             names = [simple for compound, _ in steps for simple in compound]
             rank = (
@@ -133,8 +139,18 @@ def sheet_rules(text: str, before: int) -> list[Rule]:
     return rules
 
 
-_COMMENT = re.compile(r"/\*.*?\*/", re.S)
+# Comments, and what may hold letters that mean something elsewhere: texts in quotes and addresses.
+_WHOLE = re.compile(r"""/\*.*?\*/|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|url\([^)'"]*\)""", re.S)
+_VEIL = {ord(letter): 0xE000 + ord(letter) for letter in ";{}"}
+_UNVEIL = {veil: letter for letter, veil in _VEIL.items()}
+# A state that nothing in a drawing on paper has.
+_NEVER = re.compile(r":(hover|active|focus|focus-within|focus-visible|visited|target)(?![\w-])", re.I)
 _SIMPLE = re.compile(r"[#.]?[\w-]+|\*")
+
+
+def _veiled(text: str) -> str:
+    """A style without comments, in which ; { } within quotes and addresses are other letters, until _UNVEIL."""
+    return _WHOLE.sub(lambda found: "" if found[0][0] == "/" else found[0].translate(_VEIL), text)
 
 
 def _blocks(text: str) -> Iterator[tuple[str, str]]:

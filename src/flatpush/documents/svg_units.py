@@ -15,6 +15,7 @@ PX = 0.0254 / 96  # where a drawing mixes real lengths with its own units, these
 _OLD_PX = 0.0254 / 90  # of Inkscape before 0.92
 NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LENGTH = re.compile(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*")
+TWO_COMMAS = re.compile(r",\s*,")  # between numbers: browsers then stop reading
 _WORD = re.compile(rf"{NUMBER}[a-zA-Z%]*")
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z0-9]+)\s*\(([^()]*)\)")
 NO_TURN = np.hstack([np.eye(2), np.zeros((2, 1))])
@@ -91,7 +92,7 @@ def transform(element: Element, style: Mapping[str, str]) -> Array:
         if match is None:
             raise ValueError(f"its transform is not understood ({text!r})")
         words = _WORD.findall(match[2])  # numbers need nothing between them, as in translate(20-10)
-        if _WORD.sub("", match[2]).strip(" \t\r\n,"):
+        if _WORD.sub("", match[2]).strip(" \t\r\n,") or TWO_COMMAS.search(match[2]):
             raise ValueError(f"its transform is not understood ({text!r})")
         matrix = joined(matrix, _function(match[1], words, css, text))
         place = match.end()
