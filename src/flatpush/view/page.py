@@ -28,13 +28,15 @@ from .trace import (
 )
 from .words import plan_subtitle, plan_title, push_label
 
+NUMBERS = 0.06  # of the longer side, left and below, for the numbers of the axes
+NUMBERS_OF_X = 30.0  # height of the row of numbers below, on a telephone, at MIDDLE [px]
 MIDDLE = 620.0  # width of the table between those of a telephone and of a screen [px]
 
 
 def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
     """The page: the plan's traces, object and fingers in motion, play, pause, scrub, speed, keyboard."""
     traces = trace_pushes(plan)
-    box = view_box(plan, traces, rollouts)
+    box = _with_numbers(view_box(plan, traces, rollouts))
     data = plan_data(plan, traces)
     # "<" must not stand in a script, whatever a name in the scene contains.
     script_data = json.dumps(data, separators=(",", ":"), ensure_ascii=True).replace("<", "\\u003c")
@@ -50,6 +52,12 @@ def draw_page(plan: Plan, rollouts: Sequence[Rollout] = ()) -> str:
         legend=_legend(plan, traces, bool(rollouts)),
         data=script_data,
     )
+
+
+def _with_numbers(box: Box) -> Box:
+    """A box with room for the numbers of the axes, which stand in it."""
+    room = NUMBERS * max(box[2] - box[0], box[3] - box[1])
+    return box[0] - room, box[1] - room, box[2], box[3]
 
 
 def plan_data(plan: Plan, traces: Sequence[PushTrace]) -> dict[str, object]:
@@ -150,7 +158,7 @@ def _labels(plan: Plan, traces: Sequence[PushTrace], box: Box) -> tuple[Panel, L
     for y in _grid_values(box, 1):
         place = float(panel.at(np.array([0.0, y]))[1])
         labels.boxes.append((0.0, place - 8, 44.0, place + 8))
-    labels.boxes.append((0.0, height - 18, width, height))
+    labels.boxes.append((0.0, height - NUMBERS_OF_X, width, height))
     return panel, labels
 
 
@@ -170,7 +178,7 @@ def _grid_values(box: Box, axis: int) -> Array:
     """Round values along an axis of the box [mm]; those at its edges have no room for their numbers."""
     extent = max(box[2] - box[0], box[3] - box[1])
     step = next(s for e in range(-3, 9) for s in (10.0**e, 2 * 10.0**e, 5 * 10.0**e) if extent / s <= 9)
-    low, high = box[axis] + 0.05 * extent, box[axis + 2] - 0.02 * extent
+    low, high = box[axis] + (0.05, 0.1)[axis] * extent, box[axis + 2] - 0.02 * extent
     return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
 
 
