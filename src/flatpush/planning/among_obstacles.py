@@ -23,7 +23,8 @@ from .transits import Transits
 # For each of the scene's iterations the search may expand so many poses or try so many moves in all, and without an
 # improvement of at least BETTER.
 WORK, PATIENCE = 30, 4
-PATIENCE_FREE = 2  # where the angle at the goal is free: the last polish takes its share
+# Where the angle at the goal is free, from so much work on: the last polish takes its share.
+LATE, PATIENCE_LATE = 8, 1
 BETTER = 0.003  # the part of its cost by which a path is better before it is worth checking
 LARGEST_GAP = 1.0  # clearances beyond it are not told apart [m]
 SAMPLES = 7  # points of an edge that is drawn
@@ -93,7 +94,8 @@ class AmongObstacles:
                 self.progress(self.best, spent, search.nodes)
             if search.cost < known * (1 - BETTER):
                 known, since = search.cost, search.work
-            tries = PATIENCE_FREE if self.scene.free_angle else PATIENCE
+            late = self.scene.free_angle and search.work > LATE * planning.iterations
+            tries = PATIENCE_LATE if late else PATIENCE
             patience = np.inf if path is None else float(tries * planning.iterations)
             done = search.work >= WORK * planning.iterations or search.work - since >= patience
             self.stopped_by = "time_limit" if spent > planning.time_limit else "iterations" if done else ""

@@ -14,13 +14,17 @@ from .polish import Chain
 from .trees import Trees
 
 FINER = 0.72  # from level to level
-SLACK = 1.03  # ways that are dearer than the best by this may still become the best
+# Ways that are dearer than the best by this may still become the best; where the end may turn, by that, if they end
+# with another push: the first are cheap, and a turn makes others cheaper.
+SLACK, SLACK_FREE = 1.03, 1.2
 EXPANSIONS, MOVES = (
     800,
     1200,
 )  # of a round: poses, divided by the number of pushes, and tries at a better path
 REPLANNED = 8  # moves that one counts as which is judged by replanning
-CHAINS = 5  # that are kept
+CHAINS, ALIKE = 5, 2  # that are kept; where the end may turn, so many of one sequence of pushes
+# Where the end may turn a new chain is polished so often as it gets cheaper by more, before it is compared.
+SETTLE, SETTLED, DEARER = 5, 0.99, 1.05
 # Moves at last, and the part of the cost that a knot must then save; so often.
 FINE_KNOT = 1e-4
 FINISH, CYCLES = ((2000, 1e-5), (4000, FINE_KNOT)), 4
@@ -53,6 +57,7 @@ class Search:
         self.closed, self.direct = False, False
         self._seed = seed
         self._moves = MOVES // REPLANNED if query.robust else MOVES
+        self._alike = ALIKE if query.free else CHAINS
         self._drawn: Lattice | None = None
 
     @cached_property
@@ -119,8 +124,7 @@ class Search:
         turn = 0
         while True:
             for family in families:
-                found = next(family)
-                if found is not None:
+                for found in next(family):
                     if self._take(found):
                         yield self.best
                     self._add(found)
@@ -130,8 +134,8 @@ class Search:
                 turn += 1
                 yield self.best
 
-    def _levels(self, reaches: list[Reach], changing: bool) -> Iterator[Path | None]:
-        """Level after level, ever finer, in rounds: better ways where one is found.
+    def _levels(self, reaches: list[Reach], changing: bool) -> Iterator[list[Path]]:
+        """Level after level, ever finer, in rounds: better ways where some are found.
 
         A level is searched from the start and from the goal, in turns; it ends where one of the two is through.
         """
@@ -147,32 +151,45 @@ class Search:
                         query = self.query.reversed if back else self.query
                         if len(reaches) == back:
                             reaches.append(Reach(query))
-                        pair.append(Lattice(query, reaches[back], level, self._limit, self._rng))
+                        pair.append(Lattice(query, reaches[back], level, self._limit, self._rng, self._spare))
                     lattice = pair[back]
                     found = self._advance(lattice)
-                    yield found.backwards(self.query.fleet, self.query.start) if found and back else found
+                    yield [
+                        way.backwards(self.query.fleet, self.query.start) if back else way for way in found
+                    ]
                     if lattice.done:
                         break
             k += 1
 
     @property
     def _limit(self) -> float:
-        return self.cost * SLACK
+        return self.cost * max(SLACK, self._spare)
 
-    def _advance(self, lattice: Lattice) -> Path | None:
+    @property
+    def _spare(self) -> float:
+        return SLACK_FREE if self.query.free else 1.0
+
+    def _advance(self, lattice: Lattice) -> list[Path]:
         seen, expanded = lattice.size, lattice.expanded
-        better = lattice.advance(1 + EXPANSIONS // self.query.fleet.size, self._limit)
+        found = lattice.advance(1 + EXPANSIONS // self.query.fleet.size, self._limit)
         self.work += lattice.expanded - expanded
         self.nodes += lattice.size - seen
         if self._drawn is None or self._drawn.size < lattice.size <= DRAWN:
             self._drawn = lattice
-        return lattice.path if better else None
+        return found
 
     def _add(self, path: Path) -> None:
+        alike = (c.cost for c in self.chains if c.sequence == tuple(path.pushes))
+        if self.query.free and path.cost > DEARER * min(alike, default=np.inf):
+            return
         chain = Chain(self.query, path, int(self._rng.integers(1 << 60)))
         if chain.legs:
-            chain.improve(self._moves)
-            self.work += MOVES
+            for _ in range(SETTLE if self.query.free else 1):
+                before = chain.cost
+                chain.improve(self._moves)
+                self.work += MOVES
+                if chain.cost > before * SETTLED:
+                    break
             self._keep([*self.chains, chain])
 
     def _polish(self, turn: int) -> None:
@@ -185,8 +202,8 @@ class Search:
     def _keep(self, chains: list[Chain]) -> None:
         kept: list[Chain] = []
         for chain in sorted(chains, key=lambda c: c.cost):
-            twin = any(c.sequence == chain.sequence and chain.cost < c.cost * 1.002 for c in kept)
-            if not twin:
+            same = [c for c in kept if c.sequence == chain.sequence]
+            if not any(chain.cost < c.cost * 1.002 for c in same) and len(same) < self._alike:
                 kept.append(chain)
         self.chains = kept[:CHAINS]
         if self.chains and self.chains[0].cost < self.cost * (1 - 1e-12):

@@ -12,7 +12,7 @@ from ....geometry.collision.world import Box, WorldArrays
 from ....geometry.pose import Array
 from ....steering.six_words import LEFT, MOST_WORDS, RIGHT, STRAIGHT, TURN, WORD, Records, drive
 from ...query_arrays import QueryArrays
-from ..kernels import changes, connect, free, piece_clear, put
+from ..kernels import changes, connect, free, lands, piece_clear, put
 
 X, Y, THETA, COST, LETTER, AMOUNT = range(6)  # columns of the nodes
 PARENT, PUSH, PLACE = range(3)  # columns of the links: PLACE is in the table
@@ -29,7 +29,9 @@ class Queue(NamedTuple):
         nodes: rows X … AMOUNT; links: rows PARENT, PUSH, PLACE.
         table: hash table of cells, rows (CODE, best NODE), empty at -1, its length a power of two.
         keys, heap: of the priority queue; counts: nodes, entries of the queue, nodes expanded.
-        best: cost of the best path to the goal, its last node, its push; shot: its last word, of WORD, shape (1,).
+        bound: of what is of interest, shape (1,).
+        costs, ends, shots: of the best path whose last push is each one, shape (k,): its cost, its last node before
+            the word to the goal, and that, of WORD.
     """
 
     nodes: Array
@@ -38,8 +40,10 @@ class Queue(NamedTuple):
     keys: Array
     heap: np.ndarray
     counts: np.ndarray
-    best: Array
-    shot: Records
+    bound: Array
+    costs: Array
+    ends: np.ndarray
+    shots: Records
 
 
 class Steps(NamedTuple):
@@ -49,6 +53,7 @@ class Steps(NamedTuple):
         x, y, theta: its corner and the angle of its first layer; cell [m]; angles: layers.
         step: path of the flat point in a step [m]; tries: words that are tried straight to the goal.
         changing: whether pushes may change.
+        spare: how much dearer than the best path one with another last push may be.
     """
 
     x: float
@@ -59,6 +64,7 @@ class Steps(NamedTuple):
     step: float
     tries: int
     changing: bool
+    spare: float
 
 
 class Rest(NamedTuple):
@@ -82,6 +88,20 @@ class Rest(NamedTuple):
     weight: float
     per_metre: float
     slack: float
+
+
+class Turns(NamedTuple):
+    """With which heading an end is cheapest, roughly, by where it lies before the object.
+
+    Attributes:
+        turns: heading at the end, less that of the object, shape (k pushes, rings, sectors) [rad]; of no rings where
+            the end has its heading.
+        first: radius of the first ring [m]; growth: logarithm of the ratio of a ring's radius to the one before.
+    """
+
+    turns: Array
+    first: float
+    growth: float
 
 
 @kernel()
@@ -165,13 +185,18 @@ def _down(key: Array, at: np.ndarray, size: int) -> None:
 
 
 @kernel()
-def expand(T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, budget: int) -> int:
-    """Expands up to a number of nodes; returns why it stopped: SPENT, DONE or FULL."""
-    nodes, links, table, counts, best = queue.nodes, queue.links, queue.table, queue.counts, queue.best
+def expand(
+    T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, turns: Turns, budget: int
+) -> int:
+    """Expands up to a number of nodes; returns why it stopped: SPENT, DONE or FULL.
+
+    Words are tried to the goal, or to its place with the heading that is cheapest there.
+    """
+    nodes, links, table, counts, bound = queue.nodes, queue.links, queue.table, queue.counts, queue.bound
     keys, heap, cell, angles = queue.keys, queue.heap, steps.cell, steps.angles
     k, size, queued = len(T.cars), counts[0], counts[1]
-    pose, here, words = np.empty(3), np.empty(3), np.empty(MOST_WORDS, WORD)
-    status = SPENT
+    pose, here, words, aim = np.empty(3), np.empty(3), np.empty(MOST_WORDS, WORD), goal.copy()
+    status, turning = SPENT, turns.turns.shape[1] > 0
     for _ in range(budget):
         if queued == 0:
             status = DONE
@@ -183,23 +208,28 @@ def expand(T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, 
         queued -= 1
         _down(keys, heap, queued)
         a, g = links[node, PUSH], nodes[node, COST]
-        if table[links[node, PLACE], NODE] != node or (rest.weight <= 1.0 and value >= best[0]):
+        if table[links[node, PLACE], NODE] != node or (rest.weight <= 1.0 and value >= bound[0]):
             continue
         counts[2] += 1
         for b in range(k):
             extra = T.switching[a, b]
             for j in range(3):
                 pose[j] = nodes[node, j]
-            if (b != a and not steps.changing) or g + extra >= best[0]:
+            if (b != a and not steps.changing) or g + extra >= bound[0]:
                 continue
             if b != a and not changes(T, a, b, pose):
                 continue
             # Straight to the goal.
-            if g + extra + _least(T, b, pose, goal) < best[0] and T.last[b]:
-                found = connect(T, b, pose, goal, best[0] - g - extra, steps.tries, words, here)
+            limit = min(bound[0], queue.costs[b])
+            if turning:
+                aim[2] = pose[2] + _turn(turns, b, pose, goal)
+            ends = g + extra + _least(T, b, pose, aim) < limit
+            if ends and ((free(T, b, aim) and lands(T, b, aim)) if turning else T.last[b]):
+                found = connect(T, b, pose, aim, limit - g - extra, steps.tries, words, here)
                 if found >= 0:
-                    best[0], best[1], best[2] = g + extra + words[found].cost, node, b
-                    queue.shot[0] = words[found]
+                    queue.costs[b], queue.ends[b] = g + extra + words[found].cost, node
+                    queue.shots[b] = words[found]
+                    bound[0] = min(bound[0], steps.spare * queue.costs[b])
             for letter in range(3):
                 amount = steps.step if letter == STRAIGHT else steps.step / T.cars[b].radius
                 way, speed = T.cars[b].rate[letter] * amount, T.cars[b].speed[letter]
@@ -209,7 +239,7 @@ def expand(T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, 
                     same = b == a and nodes[node, LETTER] == letter
                     ramp = 0.0 if same else speed / T.cars[b].acceleration[letter]
                     cost = g + extra + way / speed + ramp
-                if cost >= best[0]:
+                if cost >= bound[0]:
                     continue
                 put(pose, here)
                 drive(T.cars[b], letter, amount, here)
@@ -224,7 +254,7 @@ def expand(T: QueryArrays, queue: Queue, steps: Steps, rest: Rest, goal: Array, 
                 if old >= 0 and nodes[old, COST] <= cost + 1e-12:
                     continue
                 left = _rest(rest, here)
-                if cost + left >= best[0]:
+                if cost + left >= bound[0]:
                     continue
                 if not free(T, b, here) or not piece_clear(T, b, letter, amount, pose):
                     continue
@@ -270,6 +300,16 @@ def _rest(rest: Rest, pose: Array) -> float:
     v = int((pose[1] + s * rest.px + c * rest.py - rest.y) / rest.cell)
     u, v = min(max(u, 0), rest.columns - 1), min(max(v, 0), rest.rows - 1)
     return max(0.0, rest.far[v * rest.columns + u] - rest.slack) * rest.per_metre
+
+
+@inner
+def _turn(turns: Turns, b: int, pose: Array, goal: Array) -> float:
+    """By how much push b turns the object at the least cost on its way to a place."""
+    x, y = goal[0] - pose[0], goal[1] - pose[1]
+    away = math.log(max(math.hypot(x, y), turns.first) / turns.first) / turns.growth
+    rings, sectors = turns.turns.shape[1], turns.turns.shape[2]
+    sector = int(((math.atan2(y, x) - pose[2]) % TURN) / TURN * sectors + 0.5) % sectors
+    return float(turns.turns[b, min(int(away + 0.5), rings - 1), sector])
 
 
 @inner

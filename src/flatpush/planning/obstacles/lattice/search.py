@@ -14,11 +14,14 @@ from ...query import Query
 DETOUR = 1.05
 GRID_CELLS = 6_000  # of the grid over which distances to the goal are known, at most
 TRIES = 3  # words from a pose straight to the goal
+# Of the table of headings at a free end: places in polar coordinates, headings tried, and the least radius as a part of
+# the turning radius.
+RINGS, SECTORS, HEADINGS, NEAREST = 14, 36, 36, 0.2
 ROOM = 1 << 14  # nodes there is room for at first
 
 
 if TYPE_CHECKING:
-    from .kernels import Rest
+    from .kernels import Rest, Turns
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,7 @@ class Reach:
             arms = [np.hypot(*(self.point - c)) for c in (query.fleet.left[a], query.fleet.right[a])]
             rates += [left / max(arms[0], 1e-12), straight, right / max(arms[1], 1e-12)]
         self.per_metre = float(min(rates))
+        self.turns = _turns(query)
 
     def rest(self, weight: float) -> "Rest":
         """The same as kernels see it."""
@@ -83,15 +87,22 @@ class Reach:
 
 
 class Lattice:
-    """A search on one level: advance() it until it is done; `path` is the best path to the goal so far.
+    """A search on one level: advance() it until it is done.
 
     Args:
         bound: only ways that cost less are of interest.
         rng: shifts the lattice.
+        spare: how much dearer than the best path one with another last push may be, and still be of interest.
     """
 
     def __init__(
-        self, query: Query, reach: Reach, level: Level, bound: float, rng: np.random.Generator
+        self,
+        query: Query,
+        reach: Reach,
+        level: Level,
+        bound: float,
+        rng: np.random.Generator,
+        spare: float = 1.0,
     ) -> None:
         from ....steering.six_words import WORD
         from .kernels import Queue, Steps
@@ -99,14 +110,17 @@ class Lattice:
         self.query = query
         shift = rng.uniform(0, 1, 3) * [level.cell, level.cell, 2 * np.pi / level.angles]
         x, y, theta = (query.start - shift).tolist()
-        self.steps = Steps(x, y, theta, level.cell, level.angles, level.step, TRIES, level.changing)
+        self.steps = Steps(x, y, theta, level.cell, level.angles, level.step, TRIES, level.changing, spare)
         self.rest = reach.rest(level.weight)
+        self.turns = cycle([reach.turns, reach.turns._replace(turns=reach.turns.turns[:, :0])])
         self.queue = Queue(
             np.empty((ROOM, 6)), np.empty((ROOM, 3), np.int64), np.full((2 * ROOM, 2), -1), np.empty(ROOM),
-            np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound, -1.0, -1.0]), np.zeros(1, WORD),
+            np.empty(ROOM, np.int64), np.zeros(3, np.int64), np.array([bound]),
+            np.full(query.fleet.size, np.inf), np.full(query.fleet.size, -1), np.zeros(query.fleet.size, WORD),
         )  # fmt: skip
         self.done = False
         self._aims = cycle(query.aims)
+        self._aim = query.aims[0]
         q = self.queue
         for pose, a in ((pose, a) for pose, pushes in query.roots for a in pushes):
             n = self.size
@@ -127,27 +141,33 @@ class Lattice:
         """Poses that were expanded."""
         return int(self.queue.counts[2])
 
-    def advance(self, budget: int, bound: float) -> bool:
-        """Expands up to so many poses, for paths that cost less than a bound; True if a better one was found.
+    def advance(self, budget: int, bound: float) -> list[Path]:
+        """Expands up to so many poses; the better paths that were found, of those that cost less than a bound.
 
-        Words are tried to one of the goals, with every call to the next.
+        Words are tried to one of the goals, with every call to the next; where the end may turn, every other call to
+        where it costs least.
         """
         from .kernels import DONE, FULL, expand
 
-        best = self.queue.best
-        best[0] = before = min(best[0], bound)
+        self.queue.bound[0] = min(self.queue.bound[0], bound)
+        before = self.queue.costs.copy()
         left = budget
-        goal, arrays = next(self._aims)
+        turns = next(self.turns)
+        if not turns.turns.size:
+            self._aim = next(self._aims)
+        goal, arrays = self._aim
         while left > 0:
             expanded = self.expanded
-            status = expand(arrays, self.queue, self.steps, self.rest, goal, left)
+            status = expand(arrays, self.queue, self.steps, self.rest, goal, turns, left)
             if status == FULL:
                 self._grow()
                 left -= self.expanded - expanded
                 continue
             self.done = status == DONE
             break
-        return bool(best[0] < before)
+        costs = self.queue.costs
+        better = np.flatnonzero((costs < before) & (costs <= self.queue.bound[0]))
+        return [self._path(push) for push in better[np.argsort(costs[better])].tolist()]
 
     def _grow(self) -> None:
         from .kernels import rehash
@@ -157,16 +177,15 @@ class Lattice:
         self.queue = q._replace(table=np.full((2 * len(q.table), 2), -1), **twice)
         rehash(self.queue.table, self.queue.links, q.table)
 
-    @property
-    def path(self) -> Path:
-        """The best path to the goal."""
+    def _path(self, push: int) -> Path:
+        """The best path to the goal whose last push this is."""
         q = self.queue
-        node, pieces = int(q.best[1]), []
+        node, pieces = int(q.ends[push]), []
         while q.links[node, 0] >= 0:
             letter, amount = q.nodes[node, 4:6].tolist()
             pieces.append((int(q.links[node, 1]), int(letter), amount))
             node = int(q.links[node, 0])
-        shot = pieces_of(int(q.best[2]), q.shot[0])
+        shot = pieces_of(push, q.shots[push])
         return Path.of(self.query.fleet, q.nodes[node, :3].copy(), [*pieces[::-1], *shot])
 
     def edges(self, most: int) -> tuple[Array, Array]:
@@ -180,6 +199,24 @@ class Lattice:
 
 def _doubled(array: np.ndarray) -> np.ndarray:
     return np.concatenate([array, np.empty_like(array)])
+
+
+def _turns(query: Query) -> "Turns":
+    """The cheapest of some headings at places about the object, if the end may turn."""
+    from ....steering.lengths import fleet_lengths
+    from .kernels import Turns
+
+    first = NEAREST * float(np.min(query.fleet.radius))
+    box = query.extent
+    growth = np.log(max(np.hypot(box.xmax - box.xmin, box.ymax - box.ymin) / first, 2.0)) / (RINGS - 1)
+    if not (query.free and len(query.other_goals)):
+        return Turns(np.zeros((query.fleet.size, 0, SECTORS)), first, growth)
+    r, phi = first * np.exp(growth * np.arange(RINGS)), np.arange(SECTORS) * (2 * np.pi / SECTORS)
+    turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
+    ends = np.empty((RINGS, SECTORS, HEADINGS, 3))
+    ends[..., 0], ends[..., 1] = (r[:, None, None] * f(phi)[:, None] for f in (np.cos, np.sin))
+    ends[..., 2] = turns
+    return Turns(turns[np.argmin(fleet_lengths(query.fleet, np.zeros(3), ends), axis=-1)], first, growth)
 
 
 def largest_disc(query: Query) -> tuple[Array, float]:
