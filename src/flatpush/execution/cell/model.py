@@ -9,7 +9,7 @@ from ...geometry import Outline
 from ...geometry.pose import Array
 from ...problem import Scene
 from ..arms import ARMS, Arm
-from .arms import fr3, irb120
+from .arms import fr3, irb120, ur5e
 
 # The object is so high, but at most this share of the lift [m]; fingertips are balls at half of that.
 HEIGHT, OF_LIFT = 0.02, 0.6
@@ -114,7 +114,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Arm | None = None
 </mujoco>"""
 
 
-MODELS = {ARMS["irb120"].name: irb120, ARMS["fr3"].name: fr3}
+MODELS = {ARMS["irb120"].name: irb120, ARMS["fr3"].name: fr3, ARMS["ur5e"].name: ur5e}
 _SHY = 'contype="0" conaffinity="0"'  # touches only what a pair names
 
 

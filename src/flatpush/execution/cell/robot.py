@@ -17,7 +17,8 @@ from ...geometry.pose import Array
 from ...problem import Plan
 from ..addresses import Address
 from ..arms import ARMS, Arm
-from ..robot import Limits, RobotFault, State
+from ..course import planned
+from ..robot import Limits, OutOfLimits, RobotFault, State
 from ..simulated import DryRun, Unknown, home_of
 from .model import DAMPING, FOOT, STEP, STIFFNESS, Physics, cell_xml, height_of
 
@@ -31,7 +32,7 @@ Picture = NDArray[np.uint8]
 # Where Linux says that there is a display.
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 # The arms that it has.
-HELD_BY = ("irb120", "fr3")
+HELD_BY = ("irb120", "fr3", "ur5e")
 
 
 def load() -> ModuleType:
@@ -59,6 +60,7 @@ class CellRobot(DryRun):
 
     Raises:
         MissingExtra: without MuJoCo.
+        OutOfLimits: for a plan, or a home behind its first pose, out of the arm's reach: with segment, time and limit.
         InputError: for fingers that would not pass over the object when they are lifted.
     """
 
@@ -93,8 +95,10 @@ class CellRobot(DryRun):
             cell_xml(scene, plan.on_table[0].fingers, physics, arm)
         )
         self._data = self._mujoco.MjData(self._model)
-        if arm is not None and (why := arm.unreachable(self._pose)):
-            raise InputError(f"the arm cannot begin behind the plan's first pose: {why}")
+        if arm is not None and arm.unreachable(self._pose):
+            # What of the plan is out of reach says more than that the place behind its first pose is.
+            planned(plan, yaw=float(self._pose[3])).check(limits)
+            raise OutOfLimits(f"approach, 0.00 s: {arm.unreachable(self._pose)}")
         self._data.qpos[OBJECT] = scene.start_pose + start
         self._data.ctrl[:] = self._drives(self._pose)
         self._data.qpos[-len(self._data.ctrl) :] = self._data.ctrl
@@ -183,7 +187,7 @@ class CellRobot(DryRun):
 
 
 def mujoco(address: Address, plan: Plan) -> CellRobot:
-    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`, `mujoco://irb120`, `mujoco://fr3`"""
+    """`mujoco://tool?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&table=μ&seed=N`, `mujoco://irb120` (fr3, ur5e)"""
     if address.host not in ("", "tool", *HELD_BY):
         raise InputError(
             "the physics cell has no such arm",
