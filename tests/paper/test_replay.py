@@ -21,6 +21,13 @@ def test_every_given_run_is_read_and_halved(recorded):
     assert [len(part) for part in replay.halves(runs)] == [24, 17]
 
 
+def test_no_recorded_run_is_taken_for_one_of_another_object(recorded):
+    """Their tags jump by up to 12 mm, and by 97° in one frame; nothing is calibrated."""
+    runs, setup = recorded
+    for one in runs:
+        one.check(setup.objects[one.run.object], setup.fingers, setup.tip_radius)
+
+
 def test_with_nothing_fitted(recorded):
     runs, setup = recorded
     angular = only(runs, ("bigrect_3pts", "bigrect_ridge", "tri"))
@@ -54,10 +61,13 @@ def test_what_is_fitted_on_one_half_predicts_the_other(recorded):
 
 @pytest.mark.slow
 def test_starts_that_nobody_saw_are_predicted_by_the_others(recorded):
-    """The one number of a calibration that counts, on all recorded runs: 0.58 mm, at worst 1.74 mm, and 0.45°."""
+    """The numbers of a calibration that count, on all recorded runs: 0.58 mm, at worst 1.74 mm, and 0.45°, from the
+    first pose of each; 0.50 mm with what the camera saw around landings."""
     runs, setup = recorded
-    case = replay.starts_left_out(runs, setup)
-    assert len(case.final) == 41
-    assert case.final[:, 0].mean() <= 0.6e-3
-    assert case.final[:, 0].max() <= 2.2e-3
-    assert np.degrees(case.final[:, 1].mean()) <= 0.5
+    first, landed = replay.starts_left_out(runs, setup)
+    for case in (first, landed):
+        assert len(case.final) == 41
+        assert case.final[:, 0].mean() <= 0.6e-3
+        assert case.final[:, 0].max() <= 2.2e-3
+        assert np.degrees(case.final[:, 1].mean()) <= 0.5
+    assert landed.final[:, 0].mean() < 0.9 * first.final[:, 0].mean()

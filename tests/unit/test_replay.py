@@ -9,9 +9,10 @@ from flatpush.documents.robot_log import RobotRun
 from flatpush.errors import InputError
 from flatpush.experiments import experiment
 from flatpush.experiments.replay import logged
-from flatpush.geometry import compose, exp, inverse
+from flatpush.geometry import Outline, compose, exp, inverse
+from flatpush.problem import Object
 from flatpush.simulation.calibration import Parameters, Setup, contact_calibration, fit_to_ends
-from flatpush.simulation.replay import Recording, errors, replay, rigid, trajectory_errors
+from flatpush.simulation.replay import BELIEVED, Recording, errors, replay, rigid, trajectory_errors
 
 FINGERS, TIP = np.array([[0.0, 0.009], [0.0, -0.009]]), 0.0025
 TRUE = Parameters(
@@ -119,6 +120,71 @@ def test_a_hand_that_passes_by_is_an_outcome(given, recordings):
         predicted = way(away, TRUE.plant(given, "rectangle"), TRUE.registration(given, "rectangle"))
         assert predicted.outcomes == ("not touched",) * 3
         np.testing.assert_allclose(predicted.final, TRUE.registration(given, "rectangle").poses(away.first))
+
+
+def test_a_slide_at_a_landing_is_taken_from_the_camera_on_a_straight_edge_only(given):
+    """The object slides 1.6 mm along the fingers as they land, which nothing in the hand's motion tells."""
+    slip, parameters = 0.0016, replace(TRUE, tags={"rectangle": np.zeros(3)})
+    run = made(given, 0.4, parameters, arcs=(0.0, 0.0))
+    one = Recording.of(run)
+    plant, registration = parameters.plant(given, "rectangle"), parameters.registration(given, "rectangle")
+    (a, b), hand = one.strokes[1], one.hands[1]
+    q = replay(one, plant, registration).poses[0][-1]
+    slid = plant.follow(q + slip * np.array([-np.sin(hand[0, 2]), np.cos(hand[0, 2]), 0.0]), hand).object
+    slid[:3] = q  # the hand comes from a millimetre away
+    late = np.column_stack([np.interp(run.times[a:b] - TRUE.lag, run.times[a:b], c) for c in slid.T])
+    late[-1] = slid[-1]
+    poses = run.poses.copy()
+    poses[a:b] = camera_sees(late, parameters, given)
+    seen = Recording.of(replace(run, poses=poses))
+    true = registration.poses(seen.final)
+    alone, corrected = (
+        errors(parameters.replay(given, seen, landings).final, true) for landings in (False, True)
+    )
+    assert alone[0] == pytest.approx(slip, abs=1e-4)
+    assert corrected[0] == pytest.approx((1 - BELIEVED) * slip, abs=1e-4)
+    assert replay(seen, plant, registration, TRUE.lag).poses[0] == pytest.approx(
+        parameters.replay(given, seen).poses[0]
+    )
+    round_ = replace(given, objects={"rectangle": Object(Outline.circle(0.0175))})
+    both = [parameters.replay(round_, seen, landings).final for landings in (False, True)]
+    assert both[0] == pytest.approx(both[1], abs=0)
+
+
+def spoilt(run, how):
+    """The run with one thing wrong."""
+    poses, hands = run.poses.copy(), run.hands
+    if how == "still":
+        poses[:] = poses[1]
+    if how == "leaps":
+        poses[200:220, 0] += 0.05
+    if how == "mirrored":
+        poses[:, 1:] *= -1
+    if how == "scaled":
+        poses[:, :2] *= 1.3
+    return replace(run, poses=poses, hands=hands)
+
+
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [
+        ("still", "the object is not pushed: it moves by 0.0 mm at most"),
+        ("leaps", "line 200: the object jumps by 50 mm between two frames"),
+        ("mirrored", r"line 130: the object was moved by \d+ mm, and the nearest finger is \d{3}\.\d mm"),
+        (
+            "scaled",
+            r"line 130: the object was moved by \d+ mm, and the nearest finger is \d+\.\d mm from touching",
+        ),
+    ],
+)
+def test_what_cannot_be_a_run_of_this_object_is_named(given, recordings, how, says):
+    """calibrate and replay fitted and printed numbers for all of these."""
+    thing = given.objects["rectangle"]
+    recordings[0].check(thing, FINGERS, TIP)
+    with pytest.raises(InputError, match=says):
+        Recording.of(spoilt(recordings[0].run, how)).check(thing, FINGERS, TIP)
+    with pytest.raises(InputError, match="scene of another object"):
+        recordings[0].check(Object(Outline.circle(0.06)), FINGERS, TIP)
 
 
 def test_contacts_tell_the_camera_and_the_tag_without_an_end(given, recordings):

@@ -71,6 +71,7 @@ def command(
                 "runs": len(recordings), "starts": len(starts), "camera": p.camera.tolist(),
                 "tags": {name: pose.tolist() for name, pose in p.tags.items()}, "inset": p.inset,
                 "friction": p.friction, "lag": p.lag, "sd": found.sd.tolist(), "left_out": left.tolist(),
+                "first_pose": found.first_pose.tolist(),
             }
         )  # fmt: skip
         return 0
@@ -94,6 +95,10 @@ def command(
         typer.echo(
             f"starts left out: {1000 * judged[0]:.2f} mm and {math.degrees(judged[2]):.2f}° in the mean,"
             f" {1000 * judged[1]:.2f} mm and {math.degrees(judged[3]):.2f}° at worst"
+        )
+        far, turn = found.first_pose.mean(axis=0)
+        typer.echo(
+            f"  without what the camera saw around landings: {1000 * far:.2f} mm and {math.degrees(turn):.2f}° in the mean"
         )
     else:
         typer.echo("all runs begin at one start: how well others are predicted is not known")

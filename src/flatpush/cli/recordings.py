@@ -43,7 +43,8 @@ def read_recordings(
         columns, units, skip_bad: the options of these names; by default what the scenes say of their logs.
 
     Raises:
-        InputError: for a log or a scene that is none, scenes of different pushers or of one name.
+        InputError: for a log or a scene that is none, scenes of different pushers or of one name, and runs that cannot
+            be of such an object.
     """
     from ..documents import load_scene
 
@@ -90,6 +91,8 @@ def read_recordings(
     fingers = np.array([[0.0, half], [0.0, -half]]) if pusher.fingers == 2 else np.zeros((1, 2))
     middle = np.mean([one.final[:2] for one in recordings], axis=0) if pivot is None else pivot
     objects = {scene.object.name: scene.object for _, scene in read}
+    for one in recordings:
+        one.check(objects[one.run.object], fingers, pusher.tip_radius)
     return tuple(recordings), Setup(objects, fingers, pusher.tip_radius, middle, dict(carried))
 
 

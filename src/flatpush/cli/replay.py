@@ -30,6 +30,12 @@ def command(
         Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write one row for each run.")
     ] = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Draw every run as a dot.")] = None,
+    no_landings: Annotated[
+        bool,
+        typer.Option(
+            "--no-landings", help="Of the camera use only each run's first pose, nothing around its landings."
+        ),
+    ] = False,
     columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
     units: Annotated[str, typer.Option(metavar="UNITS", help=UNITS)] = "",
     skip_bad: Annotated[bool, typer.Option("--skip-bad", help=SKIP_BAD)] = False,
@@ -69,7 +75,7 @@ def command(
     with telling("replaying"):
         for one in recordings:
             registration = p.registration(setup, one.run.object)
-            predicted = p.replay(setup, one)
+            predicted = p.replay(setup, one, landings=calibration is not None and not no_landings)
             final.append(errors(predicted.final, registration.poses(one.final)))
             way.append(trajectory_errors(one, predicted, registration, p.lag).mean(axis=0))
             outcomes.append(", ".join(word for word in predicted.outcomes if word))

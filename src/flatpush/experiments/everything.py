@@ -318,7 +318,7 @@ def _replay(quick: bool, data: Path | None) -> Finding:
                         f"simulated, μ {best.friction:.2f}", f"{words}, {name}", tested, given, best
                     )
                 )
-        found.append(replay.starts_left_out(recordings, given))
+        found.extend(replay.starts_left_out(recordings, given))
     rows = []
     for case in found:
         mean, worst = case.final.mean(axis=0), case.final.max(axis=0)

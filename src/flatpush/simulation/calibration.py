@@ -87,10 +87,16 @@ class Parameters:
             setup.objects[name], setup.fingers, setup.tip_radius - self.inset, friction=self.friction
         )
 
-    def replay(self, setup: Setup, recording: Recording) -> Replayed:
-        """The run in the simulator, with these parameters."""
+    def replay(self, setup: Setup, recording: Recording, landings: bool = False) -> Replayed:
+        """The run in the simulator, with these parameters.
+
+        Args:
+            landings: whether what the camera saw around each landing is used (see replay.replay).
+        """
         name = recording.run.object
-        return replay(recording, self.plant(setup, name), self.registration(setup, name))
+        return replay(
+            recording, self.plant(setup, name), self.registration(setup, name), self.lag if landings else None
+        )
 
 
 def contact_calibration(recordings: Sequence[Recording], setup: Setup, tags: bool = True) -> Parameters:

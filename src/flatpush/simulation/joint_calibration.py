@@ -49,14 +49,16 @@ class Calibration:
     Attributes:
         parameters: fitted to all runs.
         sd: standard deviations of camera (6,), each tag (3 each), inset and friction, in their units, in this order.
-        left_out: distance [m] and angle [rad] at the end of each run (n, 2), predicted by the runs from other starts;
-            empty if all runs begin at one.
+        left_out: distance [m] and angle [rad] at the end of each run (n, 2), predicted by the runs from other starts,
+            with what the camera saw around landings; empty if all runs begin at one.
+        first_pose: the same where of the camera only the first pose of each run is used.
         starts: object and start of each run.
     """
 
     parameters: Parameters
     sd: Array
     left_out: Array
+    first_pose: Array
     starts: tuple[tuple[str, str], ...]
 
 
@@ -83,15 +85,16 @@ def calibrate(recordings: Sequence[Recording], setup: Setup) -> Calibration:
     covariance = np.linalg.inv(fit.normal(blocks, jacobian, every, x)[0])
     starts = tuple((one.run.object, one.run.start) for one in recordings)
     groups = sorted(set(starts))
-    left = np.zeros((len(recordings) if len(groups) > 1 else 0, 2))
+    left, alone = (np.zeros((len(recordings) if len(groups) > 1 else 0, 2)) for _ in range(2))
     for group in groups if len(groups) > 1 else []:
         out = np.array([start == group for start in starts])
         p = fit.parameters(fit.chords(x, blocks, jacobian, ~out))
         for k in np.flatnonzero(out).tolist():
             one = recordings[k]
             seen = p.registration(setup, one.run.object).poses(one.final)
-            left[k] = errors(p.replay(setup, one).final, seen)
-    return Calibration(fit.parameters(x), fit.scales * np.sqrt(np.diag(covariance)), left, starts)
+            left[k] = errors(p.replay(setup, one, landings=True).final, seen)
+            alone[k] = errors(p.replay(setup, one).final, seen)
+    return Calibration(fit.parameters(x), fit.scales * np.sqrt(np.diag(covariance)), left, alone, starts)
 
 
 class _Fit:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..documents.robot_log import RobotRun
 from ..errors import InputError
-from ..geometry.pose import Array, compose, inverse, wrap_angle
-from .plant import MODES, Plant
+from ..geometry.pose import Array, compose, inverse, relative, transform, wrap_angle
+from ..problem import Object
+from .plant import MODES, Plant, PlantRun
 
 # A stroke ends where rows are missing for longer than a tick, or the pusher is suddenly elsewhere. The number of the
 # push does not tell: it often changes a row before the pusher does.
@@ -19,6 +20,19 @@ JUMP = 0.009  # [m]
 TURN_JUMP = 0.5  # [rad]
 # An object that was last seen so long before the end has no final pose [s].
 UNSEEN = 0.5
+# A stroke that moves the object so far ends with a finger that touches it within so much, or so much of its size, where
+# nothing is calibrated; a camera is at most so late. In one stroke of a run the object moves by more than STILL [m, s].
+PUSHED, NEAR, NEAR_SIZE, LATE, STILL = 0.01, 0.005, 0.1, 0.3, 0.003
+# No camera misses so much of a push between two frames [m].
+LEAPS = 0.03
+# A hand that has gone no further than this still rests, or rests again [m].
+RESTS = 0.0003
+# Two fingers hold the object between these ways of the hand from where it landed [m].
+HELD = (0.01, 0.06)
+# Fingers touch one straight edge where the outline turns by no more than this from the line between them [rad].
+STRAIGHT = 0.02
+# Of what the camera says of a landing this part is believed: it is as noisy as landings differ, 0.4 mm.
+BELIEVED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +129,67 @@ class Recording:
             found.append(hand)
         return tuple(found)
 
+    @cached_property
+    def ways(self) -> tuple[Array, ...]:
+        """How far the hand has gone at the rows of each stroke [m]."""
+        steps = (np.hypot(*np.diff(hand[:, :2], axis=0).T) for hand in self.hands)
+        return tuple(np.concatenate([[0.0], np.cumsum(step)]) for step in steps)
+
+    def check(self, thing: Object, fingers: Array, tip_radius: float) -> None:
+        """Refuses what cannot be a run of this object with these fingers, whatever the camera's map and lag may be.
+
+        Raises:
+            InputError: with the run and the line: for an object that jumps, one that is never pushed, and one that
+                moves with no finger near it.
+        """
+        run, moved = self.run, 0.0
+        for (a, b), hand in zip(self.strokes, self.hands, strict=True):
+            seen = run.seen[a:b]
+            if seen.sum() < 2:
+                continue
+            times, poses, lines = run.times[a:b][seen], run.poses[a:b][seen], run.lines[a:b][seen]
+            step = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+            if np.any(step > LEAPS):
+                k = int(np.argmax(step > LEAPS))
+                raise InputError(
+                    f"line {lines[k + 1]}: the object jumps by {1000 * step[k]:.0f} mm between two frames",
+                    source=run.name,
+                    hint="A tag that is mistaken for another, or seen wrongly, does that; leave such frames out.",
+                )
+            way = float(np.hypot(*(poses[-1] - poses[0])[:2]))
+            moved = max(moved, way)
+            if way < PUSHED:
+                continue
+            tips = transform(inverse(poses[-1]), transform(hand[seen][-1], fingers))
+            gap = min(abs(thing.outline.nearest(tip).distance - tip_radius) for tip in tips)
+            late = times >= times[-1] - LATE
+            rushed = np.hypot(*np.ptp(hand[seen][late, :2], axis=0))
+            if gap > max(NEAR, NEAR_SIZE * thing.outline.size) + rushed:
+                raise InputError(
+                    f"line {lines[-1]}: the object was moved by {1000 * way:.0f} mm, and the nearest finger is"
+                    f" {1000 * gap:.1f} mm from touching its outline",
+                    source=run.name,
+                    hint="The scene of another object, a wrong scale or size of the tag, or a mirrored image does that.",
+                )
+        if moved < STILL:
+            raise InputError(
+                f"the object is not pushed: it moves by {1000 * moved:.1f} mm at most",
+                source=run.name,
+                hint="Leave this run out.",
+            )
+
+    def resting(self, k: int, lag: float) -> Array:
+        """Measured poses before the hand of a stroke moves, shape (n, 3): of this stroke, or else after the one
+        before; lag as in replay."""
+        (a, b), run, way = self.strokes[k], self.run, self.ways[k]
+        begins = run.times[a:b][np.searchsorted(way, RESTS, side="right") - 1]
+        found = run.poses[a:b][run.seen[a:b] & (run.times[a:b] <= begins + lag)]
+        if len(found) >= 2 or k == 0:
+            return found
+        (a, b), way = self.strokes[k - 1], self.ways[k - 1]
+        ends = run.times[a:b][np.searchsorted(way, way[-1] - RESTS)]
+        return run.poses[a:b][run.seen[a:b] & (run.times[a:b] >= ends + lag)]
+
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
@@ -133,19 +208,67 @@ class Replayed:
         return self.poses[-1][-1]
 
 
-def replay(recording: Recording, plant: Plant, registration: Registration) -> Replayed:
+def replay(
+    recording: Recording, plant: Plant, registration: Registration, lag: float | None = None
+) -> Replayed:
     """The run's pusher motion through the simulator, from the first measured pose.
 
     Landings are not in the logs: where a stroke begins inside the object, the object is moved out the shortest way.
+
+    Args:
+        lag: of the camera's poses [s]. With it, how far the object slid along two fingers as they landed on a straight
+            edge is estimated from what the camera saw before and after; None: of the camera only the first pose is
+            used.
     """
     pose = registration.poses(recording.first)
     poses, outcomes = [], []
-    for hand in recording.hands:
+    for k, hand in enumerate(recording.hands):
         run = plant.follow(pose, hand)
+        if lag is not None and (further := _slid(recording, k, plant, pose, run, registration, lag)):
+            pose = pose + BELIEVED * further * _along(hand[0])
+            run = plant.follow(pose, hand)
         outcomes.append(run.outcome or ("" if np.any(_touching(run.modes)) else "not touched"))
         poses.append(run.object)
         pose = run.object[-1]
     return Replayed(tuple(poses), tuple(outcomes))
+
+
+def _along(hand: Array) -> Array:
+    """The direction along the fingers, as a change of a pose."""
+    return np.array([-np.sin(hand[2]), np.cos(hand[2]), 0.0])
+
+
+def _slid(
+    recording: Recording,
+    k: int,
+    plant: Plant,
+    pose: Array,
+    run: PlantRun,
+    registration: Registration,
+    lag: float,
+) -> float:
+    """How much further the object slid along the fingers of a stroke than in the simulator, from its rest before the
+    landing, there at pose, to where it is held, by the camera [m]; 0 where that is not seen."""
+    hand, way = recording.hands[k], recording.ways[k]
+    held = (way >= HELD[0]) & (way <= HELD[1]) & _touching(run.modes).all(axis=1)
+    if run.points.shape[1] != 2 or held.sum() < 3:
+        return 0.0
+    first, second = run.points[held][-1]
+    line, outline = second - first, plant.thing.outline
+    if max(abs(outline.nearest(p).normal @ line) for p in (first, second)) > STRAIGHT * np.hypot(*line):
+        return 0.0
+    (a, b), seen = recording.strokes[k], recording.run.seen
+    times = recording.run.times[a:b]
+    gone = np.interp(times - lag, times, way)
+    after = seen[a:b] & (gone >= HELD[0]) & (gone <= HELD[1])
+    before = recording.resting(k, lag)
+    if after.sum() < 3 or not len(before):
+        return 0.0
+    there = np.column_stack([np.interp(times[after] - lag, times, column) for column in hand.T])
+    seen_in_hand = relative(there, registration.poses(recording.run.poses[a:b][after]))[:, 1]
+    in_hand = relative(hand[held], run.object[held])[:, 1]
+    moved = np.median(registration.poses(before)[:, :2], axis=0) - pose[:2]
+    return float(np.median(seen_in_hand) - np.median(in_hand) - _along(hand[0])[:2] @ moved)
 
 
 def rigid(recording: Recording, plant: Plant, registration: Registration) -> Replayed:
