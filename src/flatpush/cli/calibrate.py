@@ -98,7 +98,8 @@ def command(
         )
         far, turn = found.first_pose.mean(axis=0)
         typer.echo(
-            f"  without what the camera saw around landings: {1000 * far:.2f} mm and {math.degrees(turn):.2f}° in the mean"
+            f"  without what the camera saw around landings: {1000 * far:.2f} mm and {math.degrees(turn):.2f}° in the"
+            " mean"
         )
     else:
         typer.echo("all runs begin at one start: how well others are predicted is not known")

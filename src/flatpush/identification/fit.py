@@ -22,6 +22,12 @@ from .sensitivity import Sensitivity, Way, sensitivity
 
 # Feet that may stand anywhere are tried in these numbers.
 FREE = (3, 4, 6)
+# Loads on known feet may be better known than SD_FOOT: statics tells those of three feet. How well is taken from the
+# data, of these standard deviations of their logarithms; of one that seems so much less likely there is no search.
+SD_FEET, HOPELESS = (0.1, 0.2), 6.0
+# It narrows what is said of the uncertainty only where it is so much likelier: 2 log of the ratio, "positive" evidence
+# [Kass and Raftery, Bayes factors, 1995].
+LIKELIER = 2.0
 # Stretches whose error is beyond this many standard deviations count little (Cauchy).
 SOFT = 2.5
 # Standard deviation of log μ before anything is seen; a friction above this is not told from sticking for ever.
@@ -93,9 +99,8 @@ def fit_motion(
 
 def fit_seen(seen: Seen, thing: Object, tip_radius: float, *, known_support: bool = True) -> MotionFit:
     """The same from what recordings hold, as motion.look or motion.seen_of gives it."""
-    places, expected = thing.support.feet
-    if known_support and len(places):
-        return _fitted(KnownFeet(places, expected), None, seen, thing, tip_radius)
+    if known_support and len(thing.support.feet[0]):
+        return _known_feet(seen, thing, tip_radius)
     density = Density(thing.outline)
     start = density.mean
     fits = [_fitted(density, start, seen, thing, tip_radius)]
@@ -108,6 +113,33 @@ def fit_seen(seen: Seen, thing: Object, tip_radius: float, *, known_support: boo
         )
     fits.sort(key=lambda fit: fit.evidence)
     return replace(fits[0], others=tuple(fits[1:]))
+
+
+def _known_feet(seen: Seen, thing: Object, tip_radius: float) -> MotionFit:
+    """Loads on the feet of the object, held to what is expected of them as much as the data bear out."""
+    places, expected = thing.support.feet
+    wide = _fitted(KnownFeet(places, expected), None, seen, thing, tip_radius)
+    fits = [wide]
+    for sd in SD_FEET:
+        if _evidence(wide, sd) < wide.evidence + HOPELESS:
+            fits.append(_fitted(KnownFeet(places, expected, sd), None, seen, thing, tip_radius))
+    best = min(fits, key=lambda fit: fit.evidence)
+    likelier = wide.evidence - best.evidence > LIKELIER
+    return best if likelier else replace(best, covariance=wide.covariance)
+
+
+def _evidence(fit: MotionFit, sd: float) -> float:
+    """The evidence that a fit on known feet would have if the logarithms of the loads were expected within sd, were the
+    errors linear in the numbers."""
+    H = np.linalg.inv(fit.covariance)
+    wide, narrow = fit.pressure.precision, np.full(len(fit.numbers), sd**-2)
+    pull = fit.numbers - fit.pressure.mean
+    change = np.diag(np.append(narrow - wide, 0.0))
+    other = H + change
+    moved = change @ np.append(pull, 0.0)  # the gradient that the narrower prior adds where the fit is
+    best = float(pull @ ((narrow - wide) * pull) - moved @ np.linalg.solve(other, moved))
+    spread = float(np.linalg.slogdet(other)[1] - np.linalg.slogdet(H)[1] - np.sum(np.log(narrow / wide)))
+    return fit.evidence + best + spread
 
 
 def information(fit: MotionFit, stretches: Stretches, tip_radius: float) -> Array:

@@ -72,10 +72,11 @@ def _shares(logs: Array, by: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class KnownFeet(AbstractPressure):
-    """Feet whose places are known, and loads roughly."""
+    """Feet whose places are known, and loads within a standard deviation of their logarithms."""
 
     places: Array
     expected: Array
+    sd: float = SD_FOOT
     name: str = "feet"
 
     @property
@@ -84,7 +85,7 @@ class KnownFeet(AbstractPressure):
 
     @property
     def precision(self) -> Array:
-        return np.full(len(self.expected), SD_FOOT**-2)
+        return np.full(len(self.expected), self.sd**-2)
 
     def at(self, x: Array) -> Spread:
         loads, by = _shares(x, np.eye(len(x)))

@@ -22,7 +22,7 @@ TURN_JUMP = 0.5  # [rad]
 UNSEEN = 0.5
 # A stroke that moves the object so far ends with a finger that touches it within so much, or so much of its size, where
 # nothing is calibrated; a camera is at most so late. In one stroke of a run the object moves by more than STILL [m, s].
-PUSHED, NEAR, NEAR_SIZE, LATE, STILL = 0.01, 0.005, 0.1, 0.3, 0.003
+PUSHED, NEAR, NEAR_SIZE, LATE, STILL = 0.01, 0.005, 0.1, 0.3, 0.001
 # No camera misses so much of a push between two frames [m].
 LEAPS = 0.03
 # A hand that has gone no further than this still rests, or rests again [m].
@@ -169,7 +169,7 @@ class Recording:
                     f"line {lines[-1]}: the object was moved by {1000 * way:.0f} mm, and the nearest finger is"
                     f" {1000 * gap:.1f} mm from touching its outline",
                     source=run.name,
-                    hint="The scene of another object, a wrong scale or size of the tag, or a mirrored image does that.",
+                    hint="The scene of another object, a wrong size of the tag, or a mirrored image does that.",
                 )
         if moved < STILL:
             raise InputError(
