@@ -16,6 +16,7 @@ EXAMPLES = ROOT / "examples"
 PICTURES: dict[str, list[str]] = {
     "triangle.svg": ["plan {examples}/triangle.yaml --figure {out}"],
     "maze.svg": ["plan {examples}/maze.yaml --figure {out} --snapshots {images}/maze_snapshots.svg"],
+    "anywhere.svg": ["plan {examples}/anywhere.yaml --figure {out}"],
     "stable_region.svg": ["describe {examples}/triangle.yaml --figure {out}"],
     "tube.svg": [
         "plan {examples}/rectangle_three_feet.yaml -o {tmp}/plan.json",

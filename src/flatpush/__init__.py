@@ -45,6 +45,7 @@ _NAMES = {
     "Rollout": "problem",
     "Runs": "simulation",
     "Scene": "problem",
+    "StartRegion": "problem",
     "Support": "friction",
     "Uncertainty": "problem",
     "Workspace": "problem",
@@ -91,6 +92,7 @@ __all__ = [
     "Rollout",
     "Runs",
     "Scene",
+    "StartRegion",
     "Support",
     "Uncertainty",
     "Workspace",
@@ -136,6 +138,7 @@ if TYPE_CHECKING:
         Pusher,
         Rollout,
         Scene,
+        StartRegion,
         Uncertainty,
         Workspace,
     )

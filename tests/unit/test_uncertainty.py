@@ -138,8 +138,17 @@ def test_one_finger_is_refused_with_what_would_do():
         ({"friction": [0.5, 0.3]}, "low"),
         ({"offset": -1}, "offset"),
         ({"weight": 0.1}, "unknown key"),
-        ({}, "states loads, friction or offset"),
+        ({}, "states loads, friction, offset or start"),
         ({"friction": []}, "at least 2 entries"),
+        ({"offset": "0.5 mm"}, "without its unit"),
+        ({"start": {}}, "states position or angle"),
+        ({"start": {"position": -1}}, "position"),
+        ({"start": {"position": "2 mm"}}, "without its unit"),
+        ({"start": {"position": 200}}, "as far as the object is long, 61.03 mm"),
+        ({"start": {"angle": 50}}, "at most 45°"),
+        ({"start": {"angle": ".nan"}}, "angle"),
+        ({"start": [2, 2]}, "start"),
+        ({"start": {"place": 2}}, "unknown key"),
     ],
 )
 def test_sets_that_make_no_sense(uncertainty, message):
@@ -192,6 +201,34 @@ def test_what_is_no_share_is_refused_with_its_place(text, rule):
         parse_scene(changed(loads=text))
     assert refused.value.key == "object.uncertainty.loads"
     assert refused.value.value == text
+
+
+@pytest.mark.parametrize(
+    ("outline", "fingers", "message"),
+    [
+        ({"circle": 25}, 2, "a disc has no straight side"),
+        (SCENE["object"]["outline"], 1, "one finger does not"),
+    ],
+)
+def test_a_start_region_is_for_two_fingers_on_straight_sides(outline, fingers, message):
+    scene = {
+        **changed(start={"position": 1}),
+        "pushes": "auto",
+        "pusher": {"fingers": fingers, "spacing": 18},
+    }
+    scene["object"]["outline"] = outline
+    with pytest.raises(InputError, match=message) as refused:
+        parse_scene(scene)
+    assert refused.value.key == "object.uncertainty.start"
+    assert "feedback" in refused.value.hint
+
+
+def test_a_start_region_is_read_in_the_units_of_the_file_and_written_in_si():
+    scene = parse_scene(changed(start={"position": 2, "angle": 1.5}))
+    region = scene.object.uncertainty.start
+    assert (region.position, region.angle) == pytest.approx((0.002, np.deg2rad(1.5)))
+    again = parse_scene(scene_document(scene))
+    assert again.object.uncertainty == scene.object.uncertainty
 
 
 def test_a_known_surface_has_no_loads():

@@ -252,6 +252,18 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
                 else ""
             )
         )
+    if certificate.tube:
+        known = scene.object.uncertainty
+        region, (dx, dy) = known.start, certificate.set_end
+        typer.echo(
+            f"from every start within {1000 * region.position:.4g} mm and {math.degrees(region.angle):.4g}°: ends"
+            f" within ± {1000 * dx:.3f} mm in x and ± {1000 * dy:.3f} mm in y of that"
+            + (
+                f", clearance {1000 * certificate.set_clearance:.2f} mm"
+                if certificate.clearance is not None
+                else ""
+            )
+        )
     for warning in certificate.warnings:
         typer.echo(f"warning: {warning}", err=True)
     for path in written:

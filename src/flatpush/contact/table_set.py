@@ -137,6 +137,11 @@ class TableSet:
         change = _extreme(g[0, 0], self.weights)
         return WorstTable(float(heights[face]), self.weights * (1 - self.share * change), n)
 
+    def most(self, values: Array) -> float:
+        """The greatest Σ w v over the loads of the set, of a value v for each point (n,)."""
+        weights = self.weights * (1 - self.share * _extreme(-values, self.weights))
+        return float(weights @ values)
+
     def largest(self, cone: WrenchCone, twist: ArrayLike) -> Array:
         """The largest share, at most 1, by which loads may differ so that twists are kept, shape (...).
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Arc, CarCentres, Certificate, Plan, PushSegment, Segment, SlideSegment, TransitSegment
+from ..problem.certificate import TubePart
 from .atomic import write_atomically
 from .plan_model import (
     CertificatePart,
@@ -200,6 +201,10 @@ def _read_certificate(part: CertificatePart | NoCertificatePart) -> Certificate 
     others = {key: values.pop(key) for key in list(values) if key not in CertificatePart.model_fields}
     values["goal_error"] = tuple(values["goal_error"])
     values["set_end"] = None if values.get("set_end") is None else tuple(values["set_end"])
+    if values.get("tube") is not None:
+        values["tube"] = tuple(
+            TubePart(**{**one, "end": (float(one["end"][0]), float(one["end"][1]))}) for one in values["tube"]
+        )
     values["warnings"] = tuple(values["warnings"])
     values["cars"] = {
         name: CarCentres(**{key: tuple(pair) for key, pair in car.items()})

@@ -89,6 +89,19 @@ class CarPart(Part):
     straight: Vector2 = Field(description="The unit direction of its straight motion.")
 
 
+class TubePartModel(Part):
+    """Where the object is in one push, from wherever in the start region it began."""
+
+    push: str = Field(description="Name of the push.")
+    gap: Finite = Field(
+        description="Between a finger at its place and the side, or how deep it stands in it."
+    )
+    travel: Finite = Field(description="Of the hand, straight on, after which both fingers hold the object.")
+    offset: Finite = Field(description="Of the object from there on, along the side, to either side at most.")
+    end: Vector2 = Field(description="Half the sides of the box about the planned end of the push.")
+    clearance: Finite | None = Field(default=None, description="That is kept during the push.")
+
+
 class CertificatePart(BaseModel):
     """What was proved or measured; null where it does not apply. A later version may know more keys."""
 
@@ -119,6 +132,9 @@ class CertificatePart(BaseModel):
     )
     set_clearance: Finite | None = Field(
         default=None, description="Clearance with any offset along the fingers."
+    )
+    tube: list[TubePartModel] | None = Field(
+        default=None, description="Of each push, with a start region: where the object is."
     )
     growth: Finite | None = Field(default=None, description="The factor by which a small error grows.")
     sensitivity: SensitivityPart | None = Field(

@@ -241,6 +241,7 @@ SurfaceForm = Annotated[
 ]
 
 
+UNIT = re.compile(r"[+-]?[0-9]+(?:\.[0-9]+)? ?(m|cm|mm|deg|rad|°)", re.ASCII)
 PER_CENT = re.compile(r"([+-]?[0-9]+(?:\.[0-9]+)?) ?%", re.ASCII)
 
 
@@ -272,6 +273,26 @@ Share = Annotated[
 ]
 
 
+def _bare(value: object) -> object:
+    """Refuses a number that is written with its unit."""
+    if isinstance(value, str) and UNIT.fullmatch(value.strip()):
+        rule = (
+            "a number without its unit is needed: lengths and angles are in the units of this file (units:)"
+        )
+        raise PydanticCustomError("form", "{rule}", {"rule": rule})
+    return value
+
+
+BareLength = Annotated[float, Field(ge=0, allow_inf_nan=False), BeforeValidator(_bare)]
+
+
+class StartRegionPart(Part):
+    """Poses about the start in which the object may lie."""
+
+    position: BareLength = unstated("So far from it, in any direction; 0 if left out.")
+    angle: BareLength = unstated("Turned so far to either side, at most 45°; 0 if left out.")
+
+
 class UncertaintyPart(Part):
     """How well pressure and friction are known."""
 
@@ -283,8 +304,13 @@ class UncertaintyPart(Part):
     friction: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="[least, greatest] coefficient between fingertip and object."
     )
-    offset: NotNegative = unstated(
+    offset: BareLength = unstated(
         "How far the fingers may stand along a side from their place; 0 if left out."
+    )
+    start: StartRegionPart | None = Field(
+        default=None,
+        description="{position: 2, angle: 2}: the object may start so far from its place, turned by so much; plans"
+        " then end within the goal tolerance from all of it.",
     )
 
 
@@ -311,7 +337,8 @@ class ObjectPart(Part):
     )
     uncertainty: UncertaintyPart | None = Field(
         default=None,
-        description="{loads: 0.2, friction: [0.24, 0.4], offset: 0.5}: two-finger pushes are proved for all of it.",
+        description="{loads: 0.2, friction: [0.24, 0.4], offset: 0.5, start: {position: 2, angle: 2}}: two-finger"
+        " pushes are proved for all of it.",
     )
 
 

@@ -11,7 +11,7 @@ from ..geometry import Outline
 from ..geometry.pose import Array
 from ..problem import Object, Planning, Pusher, Scene, Workspace
 from ..problem.frame import moved_inside
-from ..problem.scene import Uncertainty
+from ..problem.scene import StartRegion, Uncertainty
 from . import scene_model as m
 from .context import PER_METRE, Context
 from .outline_reader import pixels, read_drawing
@@ -150,13 +150,25 @@ def _uncertainty(ctx: Context, part: m.UncertaintyPart | None) -> Uncertainty | 
         return None
     if not part.model_fields_set:
         raise ctx.refuse(
-            "an uncertainty states loads, friction or offset",
+            "an uncertainty states loads, friction, offset or start",
             "object.uncertainty",
             hint="Without any, leave it out.",
         )
     low_high = None if part.friction is None else (part.friction[0], part.friction[1])
     offset = part.offset / ctx.per_metre if "offset" in part.model_fields_set else 0.0
-    return Uncertainty(part.loads, low_high, offset)
+    return Uncertainty(part.loads, low_high, offset, None if part.start is None else _region(ctx, part.start))
+
+
+def _region(ctx: Context, part: m.StartRegionPart) -> StartRegion:
+    if not part.model_fields_set:
+        raise ctx.refuse(
+            "a start region states position or angle",
+            "object.uncertainty.start",
+            hint="Write {position: 2, angle: 2}, or leave it out.",
+        )
+    position = part.position / ctx.per_metre if "position" in part.model_fields_set else 0.0
+    angle = ctx.angle(part.angle) if "angle" in part.model_fields_set else 0.0
+    return StartRegion(position, angle)
 
 
 def _outline(ctx: Context, form: Any) -> Outline:

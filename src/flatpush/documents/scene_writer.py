@@ -37,6 +37,9 @@ def scene_document(scene: Scene) -> dict[str, object]:
         target["uncertainty"] = {"loads": float(known.loads), "offset": float(known.offset)}
         if known.friction is not None:
             target["uncertainty"]["friction"] = [float(x) for x in known.friction]
+        if known.start is not None:
+            region = {"position": float(known.start.position), "angle": float(known.start.angle)}
+            target["uncertainty"]["start"] = region
     pushes: str | list[dict[str, Any]] = "auto"
     if not isinstance(scene.pushes, str):
         pushes = [

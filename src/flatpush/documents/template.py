@@ -28,7 +28,7 @@ object:
   # surface: {quartic: [15 coefficients]}
   # surface: {file: surface.json}
   # How well pressure and friction are known; two-finger pushes then hold for all of it:
-  # uncertainty: {loads: 0.2, friction: [0.24, 0.4], offset: 0.5}
+  # uncertainty: {loads: 0.2, friction: [0.24, 0.4], offset: 0.5, start: {position: 2, angle: 2}}
 
 pusher:
   fingers: 2                      # 1 or 2

@@ -23,7 +23,12 @@ def scene_in_mm(scene: Scene) -> dict[str, object]:
             {"points": [[*_mm(foot[:2]), foot[2]] for foot in feet]} if feet else _mm(thing["support"])
         )
     if "uncertainty" in thing:
-        thing["uncertainty"]["offset"] = _mm(thing["uncertainty"]["offset"])
+        known = thing["uncertainty"]
+        known["offset"] = _mm(known["offset"])
+        if "start" in known:
+            known["start"] = {
+                "position": _mm(known["start"]["position"]), "angle": _degrees(known["start"]["angle"])
+            }  # fmt: skip
     for key in LENGTHS:
         pusher[key] = _mm(pusher[key])
     pusher["turn_rate"] = _degrees(pusher["turn_rate"])

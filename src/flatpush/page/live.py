@@ -99,7 +99,11 @@ class _Prepared:
         options = (*planner.options, *planner.left_out)
         space = scene.workspace
         near = np.all(np.abs(scene.goal_error(scene.start_pose)) <= scene.planning.goal_tolerance)
-        if space.bounds is not None or space.obstacles or near or not planner.usable or scene.planning.robust:
+        known, planning = scene.object.uncertainty, scene.planning
+        whole = (
+            near or not planner.usable or planning.robust or (known is not None and known.start is not None)
+        )
+        if space.bounds is not None or space.obstacles or whole:
             for answer in planner.answers():
                 if sketched and answer.path is not None:
                     sketched = False

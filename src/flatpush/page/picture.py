@@ -62,6 +62,9 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
         rows.append(("a start beside moves the end", f"{certificate.sensitivity['place']:.1f}-fold"))
     if certificate.clearance is not None:
         rows.append(("clearance", f"{MM * certificate.clearance:.2f} mm"))
+    if certificate.tube and certificate.set_end is not None:
+        dx, dy = (MM * side for side in certificate.set_end)
+        rows.append(("from every start", f"± {dx:.3f} mm in x, ± {dy:.3f} mm in y"))
     return rows
 
 

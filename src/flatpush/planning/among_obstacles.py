@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from .path import Path
 from .segments import SAG
 from .transits import Transits
 
+if TYPE_CHECKING:
+    from .tubes import Layers
+
 # For each of the scene's iterations the search may expand so many poses or try so many moves in all, and without an
 # improvement of at least BETTER.
 WORK, PATIENCE = 30, 4
@@ -36,6 +40,7 @@ class AmongObstacles:
 
     Args:
         endpoints: where the object may end, shape (e, 3), the most promising first: the goal, or angles all around.
+        layers: where the scene states a start region; options and fleet are then those of its layers.
 
     Attributes:
         search: the search, for what it has seen.
@@ -51,9 +56,13 @@ class AmongObstacles:
         transits: Transits,
         progress: Progress | None,
         endpoints: Array,
+        layers: "Layers | None" = None,
     ) -> None:
         self.scene, self.options, self.transits, self.progress = scene, options, transits, progress
         self.query = query_of(scene, options, fleet, endpoints[0])
+        self.layers = layers
+        if layers is not None:
+            self.query = replace(self.query, begins=layers.begins, ends=layers.ends)
         ends = [pose for pose in endpoints if self.query.able(pose)]
         if len(endpoints) > 1 and ends:
             self.query = replace(self.query, goal=ends[0], other_goals=np.array(ends[1:]).reshape(-1, 3))
@@ -114,7 +123,7 @@ class AmongObstacles:
                     yield path
             if done:
                 return
-            if fresh and path is not None and search.direct:
+            if fresh and path is not None and search.direct and self.layers is None:
                 fresh = False
                 if self._free(search):
                     if search.best is not None and search.cost < min(given, self.best):
@@ -137,7 +146,10 @@ class AmongObstacles:
         # Fewer pieces may cost a little; still every answer is cheaper than the one before.
         path = shorter if self.search.value(shorter) < self.best else path
         try:
-            segments = assemble(scene, self.transits, self.options, path)
+            if self.layers is None:
+                segments = assemble(scene, self.transits, self.options, path)
+            else:
+                path, segments = self.layers.plan(path, self.transits, self.search.clear)
         except FlatpushError as error:
             self.refused += 1
             self.complaint = f"{error}."
@@ -149,7 +161,7 @@ class AmongObstacles:
                 f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm)."
             )
             return None
-        self.best = self.search.value(path)
+        self.best = self.search.value(path) if self.layers is None else path.cost
         if self._first is None:
             self._first = clock() - began
         details = {"first_path_time": self._first, "poses_searched": self.search.nodes}

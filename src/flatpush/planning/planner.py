@@ -15,6 +15,8 @@ from ..geometry.collision import Body, World, pose_clearance
 from ..geometry.pose import Array, wrap_angle
 from ..problem import Plan, Scene
 from ..problem.frame import moved_inside
+from ..problem.mechanics import proved_for_set, starts_anywhere
+from ..problem.scene import GOAL_TOLERANCE
 from ..steering.fleet import Fleet
 from ..steering.free_heading import HEADINGS, cheapest_headings
 from ..steering.lengths import fleet_lengths
@@ -25,12 +27,13 @@ from .candidates import automatic_pushes
 from .controllability import Controllability, controllability
 from .empty_table import ROUND, Found, direct_paths, refined_paths
 from .fleets import fleet_of
-from .obstacles import TOUCHING, check_endpoints
+from .obstacles import TOUCHING, check_endpoints, check_region
 from .options import PushOption, push_options
 from .transits import Transits
 
 if TYPE_CHECKING:
     from .sliding import SlidePlanner
+    from .tubes import Tubes
 
 APART = np.deg2rad(9)  # between two angles at a free goal that are searched for among obstacles
 # Rounds for each of many starts: more hardly lower the cost (benchmarks/many_starts.py).
@@ -121,7 +124,10 @@ class Planner:
         scene = self.scene if start is None else replace(self.scene, start=start)
         if _crowded(scene) and not scene.free_angle:
             check_endpoints(scene)
-        if np.all(np.abs(scene.goal_error(scene.start)) <= scene.planning.goal_tolerance):
+        tubed = starts_anywhere(scene) and proved_for_set(scene)
+        if tubed:
+            check_region(scene)
+        if _at_goal(scene, tubed):
             yield Answer(0.0, partial(_solved, scene, (), began, {}))
             return
         if not self.usable:
@@ -137,24 +143,28 @@ class Planner:
                 )
             yield Answer(np.inf, partial(_none, scene, reason, began))
             return
+        tubes = self._tubes(scene) if tubed else None
+        if tubes is not None and (reason := tubes.refusal()):
+            lines = (reason, _listed(self.reasons))
+            yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
+            return
         best, stopped_by, details = np.inf, "", dict[str, Any]()
         failed: dict[str, str] = {}
         if _crowded(scene):
             endpoints = self._fitting(scene) if scene.free_angle else scene.goal_pose[None]
-            self._among = AmongObstacles(
-                scene, self.usable, self.fleet, self.transits, self._progress, endpoints
-            )
-            for found, segments in self._among.plans():
+            for found, segments in self._found_among(scene, endpoints, tubes):
                 best, details = found.cost, found.details
                 yield Answer(best, partial(_solved, scene, segments, began, details), details, found.path)
-            stopped_by = self._among.stopped_by
+            stopped_by = self._among.stopped_by if self._among is not None else ""
         else:
-            for found in self._candidates(scene):
+            for found in self._candidates(scene) if tubes is None else tubes.paths():
                 stopped_by = found.details.pop("stopped_by", "")
                 if found.cost >= best * (1 - 1e-12):
                     continue
                 try:
                     segments = assemble(scene, self.transits, self.usable, found.path)
+                    if tubes is not None and (lacks := tubes.complaint(segments)):
+                        raise InputError(lacks)
                 except FlatpushError as error:
                     failed.setdefault(self.usable[found.path.pushes[0]].push.name, str(error))
                     continue
@@ -170,6 +180,53 @@ class Planner:
             blocked = "" if self._among is None else self._among.tried.strip()
             lines = (blocked, _listed(self.reasons | failed))
             yield Answer(np.inf, partial(_none, scene, "\n".join(line for line in lines if line), began))
+
+    def _tubes(self, scene: Scene) -> "Tubes":
+        from .tubes import Tubes
+
+        return Tubes(scene, self.usable, self.fleet)
+
+    def _found_among(
+        self, scene: Scene, endpoints: Array, tubes: "Tubes | None"
+    ) -> Iterator[tuple[Found, Segments]]:
+        """What is found among obstacles, better and better."""
+        if tubes is None:
+            self._among = AmongObstacles(
+                scene, self.usable, self.fleet, self.transits, self._progress, endpoints
+            )
+            yield from self._among.plans()
+            return
+        # What costs least on an empty table may keep clear; if not, it is searched for with room for the tube, and
+        # without where there is none.
+        best = np.inf
+        for found in tubes.paths():
+            best = np.inf
+            try:
+                segments = assemble(scene, self.transits, self.usable, found.path)
+            except FlatpushError:
+                continue
+            if not tubes.complaint(segments):
+                best = found.cost
+                yield found, segments
+        if np.isfinite(best):
+            return
+        from .tubes import Layers
+
+        layers = Layers(tubes)
+        for more in tubes.rooms():
+            planning = replace(
+                scene.planning, clearance=scene.planning.clearance + more, goal_tolerance=GOAL_TOLERANCE
+            )
+            self._among = AmongObstacles(
+                replace(scene, planning=planning), layers.options, layers.fleet, self.transits, self._progress,
+                endpoints, layers,
+            )  # fmt: skip
+            for found, segments in self._among.plans():
+                if found.cost < best:
+                    best = found.cost
+                    yield found, segments
+            if np.isfinite(best):
+                return
 
     @property
     def _slides_too(self) -> bool:
@@ -290,6 +347,19 @@ def plan(scene: Scene) -> Plan:
 
 def _crowded(scene: Scene) -> bool:
     return scene.workspace.bounds is not None or bool(scene.workspace.obstacles)
+
+
+def _at_goal(scene: Scene, tubed: bool) -> bool:
+    """Whether the start is within the goal's tolerance, with all of the region about it."""
+    off = np.abs(scene.goal_error(scene.start))
+    known = scene.object.uncertainty
+    if tubed and known is not None and known.start is not None:
+        off += [
+            known.start.position,
+            known.start.position,
+            0.0 if scene.free_angle else known.start.angle,
+        ]
+    return bool(np.all(off <= scene.planning.goal_tolerance))
 
 
 def _listed(reasons: dict[str, str]) -> str:

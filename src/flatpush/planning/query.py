@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import vector
 from ..errors import InputError
@@ -47,6 +48,7 @@ class Query:
         slack: how far from the goal the end may be, shape (3,) [m, m, rad]; its angle counts unless that is free.
         robust: whether a path is judged by what it costs when every switch pose is missed by a little and the next
             push is planned again (offsets), instead of by its own cost.
+        begins, ends: the pushes that a path may begin with and end with, shape (k,); None: any.
 
     Raises:
         InputError: for poses that are not finite or of another shape, or an empty fleet.
@@ -64,6 +66,8 @@ class Query:
     free: bool = False
     slack: Array = field(default_factory=lambda: np.zeros(3))
     robust: bool = False
+    begins: NDArray[np.bool_] | None = None
+    ends: NDArray[np.bool_] | None = None
     other_starts: Array = field(default_factory=lambda: np.zeros((0, 3)))
     other_goals: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -94,7 +98,9 @@ class Query:
             np.zeros(self.fleet.size, np.bool_), offsets() if self.robust else np.zeros((0, 3)), self.goal.copy(),
             np.array([*self.slack[:2], np.pi if self.free else self.slack[2]]), self.clearance, self.room, self.inside,
         )  # fmt: skip
-        arrays.last[:] = [stands(arrays, a, self.goal) for a in range(self.fleet.size)]
+        arrays.last[:] = [
+            _among(self.ends, a) and stands(arrays, a, self.goal) for a in range(self.fleet.size)
+        ]
         return arrays
 
     def able(self, pose: Array) -> list[int]:
@@ -106,7 +112,7 @@ class Query:
     @cached_property
     def first(self) -> list[int]:
         """The pushes that can begin: their fingers land at the start."""
-        return self.able(self.start)
+        return self._beginning(self.start)
 
     @cached_property
     def last(self) -> list[int]:
@@ -116,7 +122,10 @@ class Query:
     @cached_property
     def roots(self) -> list[tuple[Array, list[int]]]:
         """All poses where a path may begin, with the pushes that can begin there."""
-        return [(pose, self.able(pose)) for pose in (self.start, *self.other_starts)]
+        return [(pose, self._beginning(pose)) for pose in (self.start, *self.other_starts)]
+
+    def _beginning(self, pose: Array) -> list[int]:
+        return [a for a in self.able(pose) if _among(self.begins, a)]
 
     @cached_property
     def aims(self) -> list[tuple[Array, QueryArrays]]:
@@ -124,7 +133,7 @@ class Query:
         found = [(self.goal, self.arrays)]
         for pose in self.other_goals:
             last = np.zeros(self.fleet.size, np.bool_)
-            last[self.able(pose)] = True
+            last[[a for a in self.able(pose) if _among(self.ends, a)]] = True
             found.append((pose, self.arrays._replace(goal=pose.copy(), last=last)))
         return found
 
@@ -155,9 +164,15 @@ class Query:
             fleet=back,
             start=self.goal,
             goal=self.start,
+            begins=self.ends,
+            ends=self.begins,
             other_starts=self.other_goals,
             other_goals=self.other_starts,
         )
+
+
+def _among(few: NDArray[np.bool_] | None, push: int) -> bool:
+    return few is None or bool(few[push])
 
 
 def _padded(points: np.ndarray, size: int) -> np.ndarray:

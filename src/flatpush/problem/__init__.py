@@ -2,7 +2,7 @@
 
 from .certificate import CarCentres, Certificate
 from .plan import Arc, Plan, PushSegment, Rollout, Segment, SlideSegment, TableSegment, TransitSegment
-from .scene import Object, Planning, Push, Pusher, Scene, Uncertainty, Workspace
+from .scene import Object, Planning, Push, Pusher, Scene, StartRegion, Uncertainty, Workspace
 
 __all__ = [
     "Arc",
@@ -18,6 +18,7 @@ __all__ = [
     "Scene",
     "Segment",
     "SlideSegment",
+    "StartRegion",
     "TableSegment",
     "TransitSegment",
     "Uncertainty",

@@ -21,6 +21,28 @@ class CarCentres:
 
 
 @dataclass(frozen=True)
+class TubePart:
+    """Where the object is in one push, from wherever in the start region it began.
+
+    Attributes:
+        push: name of the push.
+        gap: between a finger at its place and the object's side, at most; as deep it may stand in the way [m].
+        travel: of the hand, straight on from its place, after which both fingers hold [m].
+        offset: of the object from there on, along the side that is pushed, to either side at most; its angle and its
+            distance from the hand are as planned [m].
+        end: half the sides in x and y of the box about the planned end of the push that this makes [m].
+        clearance: that is kept during the push, and while the object waits for it [m]; None with nothing around.
+    """
+
+    push: str
+    gap: float
+    travel: float
+    offset: float
+    end: Vector
+    clearance: float | None = None
+
+
+@dataclass(frozen=True)
 class Certificate:
     """The numbers that simulation.certify computes from a scene and its segments; None where one does not apply.
 
@@ -54,8 +76,9 @@ class Certificate:
         set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
             offset of that set.
         set_end: half the sides of the box in x and y about the planned end in which the object ends with any offset of
-            that set along the fingers, its angle being the planned one [m].
-        set_clearance: clearance that remains with any such offset [m].
+            that set along the fingers, its angle being the planned one [m]; with a start region, from all of it.
+        set_clearance: clearance that remains with any such offset [m]; with a start region, from all of it.
+        tube: where the object is in each push, with a start region of which that could be said; else None.
         growth: one finger: the factor e^(ℓ/L) by which a small error of the bearing contact → COF grows.
         sensitivity: plans with slides: how far the outline's farthest point ends elsewhere, about, if the object starts
             beside ("place") [m/m] or turned ("turn") [m/rad], the finger has more or less friction ("friction") [m],
@@ -81,6 +104,7 @@ class Certificate:
     set_loads: float | None = None
     set_end: Vector | None = None
     set_clearance: float | None = None
+    tube: tuple[TubePart, ...] | None = None
     growth: float | None = None
     sensitivity: Mapping[str, float] | None = None
     clearance: float | None = None

@@ -5,12 +5,17 @@ from functools import lru_cache
 import numpy as np
 
 from ..contact import Placement, PointContact, cone_twists, place_fingers
+from ..contact.landing import Landing, Side, landing
 from ..contact.proved_twists import Bounds, proved_twists
-from ..errors import FlatpushError
+from ..contact.table_set import TableSet
+from ..errors import FlatpushError, InputError
 from ..friction import Ellipsoid, Exact, LimitSurface, Quartic, Support, fit_surface, local_ellipsoid
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from .scene import Cost, Model, Object, Push, Scene
+
+# Of a start region: so often the offset that pushes are proved for is widened, by this part, as they change.
+TILTS, WIDER = 3, 0.02
 
 
 def named(scene: Scene, name: str) -> Push:
@@ -60,12 +65,32 @@ def cone_motions(
     motions = _cone_motions(scene.object, placement, surface, share, planning.cost, quick)
     if not proved_for_set(scene):
         return motions
-    return _set_motions(scene.object, placement, share, motions.tobytes())
+    side = side_of(scene, placement) if starts_anywhere(scene) else None
+    return _set_motions(scene.object, placement, side, share, motions.tobytes())
 
 
 def proved_for_set(scene: Scene) -> bool:
     """Whether pushes must hold for every table of a set."""
     return scene.object.uncertainty is not None and scene.planning.proof == "set"
+
+
+def starts_anywhere(scene: Scene) -> bool:
+    """Whether the object starts anywhere in a region."""
+    return scene.object.uncertainty is not None and scene.object.uncertainty.start is not None
+
+
+def side_of(scene: Scene, placement: Placement) -> Side:
+    """The straight side that two fingers push at. Raises InputError where they push at none."""
+    return _side(scene.object.outline, placement, scene.pusher.approach)
+
+
+def first_landing(scene: Scene, side: Side, tilt: float) -> Landing:
+    """What is left of the start region after a landing at a side (see contact.landing.landing).
+
+    Raises:
+        InputError: as that.
+    """
+    return _first_landing(scene.object, side, round(tilt, 9))
 
 
 def slider_of(thing: Object) -> Array:
@@ -144,16 +169,54 @@ def _cone_motions(
 
 
 @lru_cache(maxsize=256)
-def _set_motions(thing: Object, placement: Placement, margin: float, nominal: bytes) -> Array:
+def _set_motions(
+    thing: Object, placement: Placement, side: Side | None, margin: float, nominal: bytes
+) -> Array:
     assert thing.uncertainty is not None
     known = thing.uncertainty
     low = known.friction[0] if known.friction else thing.friction
-    bounds = Bounds(known.loads, low, known.offset)
-    motions = proved_twists(
-        thing.support, _contacts(thing, placement), margin, np.frombuffer(nominal).reshape(3, 3), bounds
-    )
+    motions = np.frombuffer(nominal).reshape(3, 3)
+    offset = 0.0
+    for _ in range(TILTS):
+        if side is not None:
+            # How much is left of a start depends on how the straight motion stands to the side.
+            left = _left_of_start(thing, side, side.tilt(motions[1, :2]))
+            if left <= offset:
+                break
+            offset = left * (1 + WIDER)
+        bounds = Bounds(known.loads, low, known.offset + offset)
+        motions = proved_twists(
+            thing.support, _contacts(thing, placement), margin, np.frombuffer(nominal).reshape(3, 3), bounds
+        )
+        if side is None:
+            break
     motions.setflags(write=False)
     return motions
+
+
+def _left_of_start(thing: Object, side: Side, tilt: float) -> float:
+    """The offset that a push is proved for [m]: what a first landing leaves, or, of a push that only comes later, as
+    much as the start is off."""
+    assert thing.uncertainty is not None
+    assert thing.uncertainty.start is not None
+    try:
+        return _first_landing(thing, side, round(tilt, 9)).offset
+    except InputError:
+        return thing.uncertainty.start.position
+
+
+@lru_cache(maxsize=256)
+def _side(outline: Outline, placement: Placement, approach: float) -> Side:
+    return Side.of(outline, placement, approach)
+
+
+@lru_cache(maxsize=1024)
+def _first_landing(thing: Object, side: Side, tilt: float) -> Landing:
+    assert thing.uncertainty is not None
+    assert thing.uncertainty.start is not None
+    return landing(
+        TableSet.of(thing.support, thing.uncertainty.loads), thing.cof, side, thing.uncertainty.start, tilt
+    )
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import is_finite, is_number, numbers, vector
+from ..contact.landing import StartRegion
 from ..errors import InputError
 from ..friction.support import Support
 from ..friction.surface import LimitSurface
@@ -27,11 +28,14 @@ class Uncertainty:
         loads: pressure times table friction is within this share of its nominal value at every point, in [0, 1).
         friction: least and greatest Coulomb coefficient between fingertip and object; None: as the object's.
         offset: the fingers may stand so far along a straight side from where they should, either way [m].
+        start: where the object may be about the scene's start; None: nothing is said, and each push is taken to begin
+            within the offset of its place.
     """
 
     loads: float = 0.0
     friction: tuple[float, float] | None = None
     offset: float = 0.0
+    start: StartRegion | None = None
 
     def __post_init__(self) -> None:
         def need(good: bool, key: str, rule: str) -> None:
@@ -114,6 +118,20 @@ class Object:
                 "a known limit surface has no loads that could differ",
                 key="object.uncertainty",
                 hint="Give the support instead of the surface.",
+            )
+        if self.uncertainty.start is None:
+            return
+        if self.outline.is_circle:
+            raise InputError(
+                "a disc has no straight side that would come to rest against two fingers",
+                key="object.uncertainty.start",
+                hint="Leave the start region out; feedback makes up for where a disc starts: flatpush track.",
+            )
+        if self.uncertainty.start.position > self.outline.size:
+            raise InputError(
+                f"a start region reaches at most as far as the object is long, {1000 * self.outline.size:.4g} mm",
+                key="object.uncertainty.start.position",
+                value=self.uncertainty.start.position,
             )
 
     @property
@@ -365,6 +383,15 @@ class Scene:
             object.__setattr__(self, name, pose)
         if self.pushes != "auto":
             object.__setattr__(self, "pushes", _checked_pushes(self.pushes))
+        known = self.object.uncertainty
+        if known is not None and known.start is not None:
+            two = [self.pusher.fingers] if isinstance(self.pushes, str) else [p.fingers for p in self.pushes]
+            if 2 not in two:
+                raise InputError(
+                    "one finger does not make up for an object that starts elsewhere",
+                    key="object.uncertainty.start",
+                    hint="Push with two fingers, or leave the start region out and use feedback: flatpush track.",
+                )
 
     @property
     def start_pose(self) -> Array:

@@ -6,6 +6,7 @@ from functools import reduce
 import numpy as np
 
 from ..contact import PointContact, steering_forces
+from ..errors import InputError
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, relative, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
@@ -27,6 +28,7 @@ from .margins import Margins, worse_of
 from .pieces import progress, turns_along
 from .proof import offset_end, proof_of
 from .slides import plant_of_slides, rolled_out, sensitivity_of
+from .tube import tube_of
 
 # Beyond this growth of a small error no open-loop push of one finger can be trusted (methods 1.17: ℓ/L ≈ 4).
 TRUSTED_GROWTH = float(np.exp(4.0))
@@ -93,11 +95,20 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
         cost += sum(float(s.times[-1]) for s in transits)
     elif scene.planning.cost == "pusher":
         cost += sum(_transit_length(s) for s in transits)
-    proof, clearance, known = (
-        proof_of(scene, pushes),
-        clearance_of(scene, segments),
-        scene.object.uncertainty or Uncertainty(),
-    )
+    known, no_tube = scene.object.uncertainty or Uncertainty(), ""
+    try:
+        tube = tube_of(scene, segments)
+    except InputError as error:
+        tube, no_tube = None, f"it is not said where the object ends from every start: {error}"
+    proof, clearance = proof_of(scene, pushes, tube), clearance_of(scene, segments)
+    set_end = set_clearance = None
+    if tube:
+        set_end = tube[-1].end
+        if clearance is not None:
+            set_clearance = min([clearance, *(p.clearance for p in tube if p.clearance is not None)])
+    elif proof is not None and known.start is None:
+        set_end = offset_end(scene, pushes[-1])
+        set_clearance = None if clearance is None else clearance - known.offset
     x, y, angle = (float(value) for value in scene.goal_error(pose))
     return Certificate(
         goal_error=(x, y, angle),
@@ -113,13 +124,18 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
         model_offset=worst.offset,
         set_margin=None if proof is None else proof.margin,
         set_loads=None if proof is None else proof.loads,
-        set_end=None if proof is None else offset_end(scene, pushes[-1]),
-        set_clearance=None if proof is None or clearance is None else clearance - known.offset,
+        set_end=set_end,
+        set_clearance=set_clearance,
+        tube=tube,
         growth=growth,
         sensitivity=sensitivity_of(scene, segments),
         clearance=clearance,
         cars=cars,
-        warnings=(*_warnings(growth, worst), *((LESS_CERTAIN,) if slides else ())),
+        warnings=(
+            *_warnings(growth, worst),
+            *((LESS_CERTAIN,) if slides else ()),
+            *((no_tube,) if no_tube else ()),
+        ),
     )
 
 

@@ -1,6 +1,6 @@
 """How near object and fingertips come to obstacles and bounds, between samples included."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,13 @@ def clearance_of(scene: Scene, segments: Sequence[Segment], need: float = -np.in
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
         a, b = np.concatenate([a, m]), np.concatenate([m, b])
     return best if best < need else min(best, floor)
+
+
+def object_distances(scene: Scene) -> Callable[[Array], Array] | None:
+    """What gives the distance of the object alone to obstacles and bounds at poses X_WO (n, 3) [m]; None without."""
+    if scene.workspace.bounds is None and not scene.workspace.obstacles:
+        return None
+    return _World(scene).object_distances
 
 
 class _Motion:

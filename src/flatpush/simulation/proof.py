@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..geometry import perpendicular, rotate, shift_twist
 from ..geometry.pose import Array
 from ..problem import Plan, PushSegment, Scene
+from ..problem.certificate import TubePart
 from ..problem.mechanics import contacts_of, named, placement_of
 from ..problem.scene import Uncertainty
 
@@ -80,21 +81,28 @@ def prove(plan: Plan, loads: float = 0.2, *, friction: float | None = None, offs
     return found
 
 
-def proof_of(scene: Scene, pushes: Sequence[PushSegment]) -> Proof | None:
-    """The proof for the uncertainty of the scene's object; None without one, without a motion or with one finger."""
+def proof_of(
+    scene: Scene, pushes: Sequence[PushSegment], tube: Sequence[TubePart] | None = None
+) -> Proof | None:
+    """The proof for the uncertainty of the scene's object; None without one, without a motion or with one finger.
+
+    Args:
+        tube: of the plan, where there is one: it says how far the object is off along the fingers.
+    """
     known = scene.object.uncertainty
     if known is None or any(len(segment.fingers) != 2 for segment in pushes):
         return None
     mu = scene.object.friction if known.friction is None else known.friction[0]
     tables = TableSet.of(scene.object.support, known.loads)
     margins, loads, found = [], 1.0, list[tuple[WrenchCone, Array, str, int]]()
-    for segment in pushes:
+    for number, segment in enumerate(pushes):
         contacts = contacts_of(scene, placement_of(scene, named(scene, segment.push)))
+        offset = known.offset if tube is None else tube[number].offset
         moving = [i for i, arc in enumerate(segment.arcs) if arc.duration > 0]
         if not moving:
             continue
         twists = np.array([shift_twist(segment.arcs[i].twist, scene.object.cof) for i in moving])
-        for pair in shifted([replace(c, friction=mu) for c in contacts], known.offset):
+        for pair in shifted([replace(c, friction=mu) for c in contacts], offset):
             cone = WrenchCone.of(pair)
             found += [(cone, V, segment.push, i) for i, V in zip(moving, twists, strict=True)]
             margins += tables.margin(cone, twists).tolist()

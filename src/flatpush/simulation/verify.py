@@ -9,9 +9,11 @@ import numpy as np
 from ..documents.scene_digest import SceneDifference, scene_differences, scene_digest
 from ..errors import FlatpushError, InputError
 from ..problem import Certificate, Plan, Scene
+from ..problem.mechanics import proved_for_set, starts_anywhere
 from .claims import arc_costs, certify
 from .execution import Finding, execution_findings
 from .slides import slide_sensitivity
+from .tube import tube_excess
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
 
@@ -104,6 +106,7 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
         claims.append(
             Claim("set_margin kept", None, computed.set_margin, 0.0, kept, "on every table of the set")
         )
+    claims += _tube_kept(plan.scene, computed)
     clearance = computed.clearance
     if clearance is not None:
         need = plan.scene.clearance
@@ -111,6 +114,21 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
             Claim("clearance kept", None, clearance, need, clearance >= need - ABSOLUTE, "as required")
         )
     return Report((*claims, *(_executed(finding) for finding in findings)))
+
+
+def _tube_kept(scene: Scene, computed: Certificate) -> list[Claim]:
+    """That a plan for a start region ends within the goal's tolerance and keeps clear from all of it."""
+    if not (starts_anywhere(scene) and proved_for_set(scene)):
+        return []
+    if computed.tube is None:
+        why = computed.warnings[-1] if computed.warnings else "there is no push"
+        return [Claim("tube", None, why, 0.0, False, "from every start of the region")]
+    share = tube_excess(scene, computed)
+    claims = [Claim("tube ends at the goal", None, share, 1.0, share <= 1.0, "within the goal tolerance")]
+    room, need = computed.set_clearance, scene.planning.clearance
+    if room is not None:
+        claims.append(Claim("tube kept clear", None, room, need, room >= need - ABSOLUTE, "as required"))
+    return claims
 
 
 def _executed(finding: Finding) -> Claim:

@@ -10,6 +10,7 @@ SIMULATED = "#d62728"
 OBSTACLE = "#c1272d"
 BOUNDS = "#3b6fb6"
 PUSHER = "#4d4d4d"
+TUBE = "#3a86c8"
 TREE = "#8a93a0"
 FORCE = "#1f5fd0"  # friction cone, as in [Zhou2017] Fig. 1
 MOTION = "#d1262b"  # motion cone, as in [Zhou2017] Fig. 1

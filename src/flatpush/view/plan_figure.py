@@ -34,6 +34,7 @@ CELL_HEIGHT = 68.0  # of the strip [pt]
 ALONE, LIFTED = (3.0, 2.0), (1.0, 2.5)  # dashes
 RUN = (4.0, 2.0)
 SLIDING = (2.5, 1.5)
+TUBE = Look(palette.TUBE, 0.5, opacity=0.8, fill=palette.TUBE, fill_opacity=0.2)
 
 
 def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | None = None) -> Drawing:
@@ -67,6 +68,7 @@ def draw_plan(plan: Plan, rollouts: Sequence[Rollout] = (), explored: Array | No
     labels = Labels(panel, what_is_drawn(plan, traces))
     for trace in traces:
         _draw_push(panel, plan, trace, labels)
+    _draw_tube(panel, plan)
     _draw_transits(panel, plan)
     draw_endpoints(panel, plan, labels)
     for trace in traces[:1]:
@@ -113,6 +115,27 @@ def _draw_push(panel: Panel, plan: Plan, trace: PushTrace, labels: Labels) -> No
         panel.line(MM * first, Look(colour, 1.9, SLIDING), 7)
     if len(plan.on_table) > 1:
         draw_number(panel.page, labels.place(13.0, 13.0, along(panel, MM * first), free=True), trace.number)
+
+
+def tube_bands(plan: Plan) -> list[Array]:
+    """Where the centre of friction may be, from any start, in W: polygons (n, 2) [m], the start region's disc first."""
+    known, certificate = plan.scene.object.uncertainty, plan.certificate
+    if certificate is None or not certificate.tube or known is None or known.start is None:
+        return []
+    cof = plan.scene.object.cof
+    turns = np.linspace(0.0, 2 * np.pi, 73)
+    reach = known.start.moves(float(np.hypot(*cof)))
+    bands = [transform(plan.scene.start_pose, cof) + reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)]
+    for part, push in zip(certificate.tube, plan.pushes, strict=True):
+        along = np.stack([-np.sin(push.pusher[:, 2]), np.cos(push.pusher[:, 2])], axis=1)
+        path, aside = transform(push.object, cof), part.offset * along
+        bands.append(np.concatenate([path + aside, (path - aside)[::-1]]))
+    return bands
+
+
+def _draw_tube(panel: Panel, plan: Plan) -> None:
+    for band in tube_bands(plan):
+        panel.area(MM * band, TUBE, 4.5)
 
 
 def _draw_transits(panel: Panel, plan: Plan) -> None:
@@ -250,6 +273,8 @@ def _legend(plan: Plan, traces: Sequence[PushTrace], box: Box, simulated: bool, 
         if traces[0].motion is not None:
             look = Look(palette.MOTION, fill=palette.MOTION, fill_opacity=0.22)
             entries.append(Entry(words.MOTION_CONE, look, "box"))
+    if tube_bands(plan):
+        entries.append(Entry(words.TUBE, TUBE, "box"))
     entries += workspace_entries(plan.scene)
     if tree:
         entries.append(Entry(words.TREE, Look(palette.TREE, 0.8)))

@@ -108,6 +108,9 @@ class ReplanningController(AbstractController[ReplanningState]):
             raise InputError(
                 "a tolerance is a distance and an angle, both positive", key="tolerance", value=tolerance
             )
+        known = scene.object.uncertainty
+        if known is not None and known.start is not None:  # it is looked at where it starts
+            scene = replace(scene, object=replace(scene.object, uncertainty=replace(known, start=None)))
         crowded(scene)  # refuses what is not done among things
         planner = Planner(scene)
         if not planner.usable:

@@ -5,7 +5,7 @@ lattices find narrower ones, and what they find is made shorter by moves that ke
 Whether a motion keeps the clearance is decided exactly, between its ends included (geometry.collision).
 """
 
-from .endpoints import TOUCHING, check_endpoints
+from .endpoints import TOUCHING, check_endpoints, check_region
 from .polish.polish import KNOT
 from .prune import pruned
 from .scene_query import careful, obstructions, query_of
@@ -19,6 +19,7 @@ __all__ = [
     "Search",
     "careful",
     "check_endpoints",
+    "check_region",
     "obstructions",
     "pruned",
     "query_of",

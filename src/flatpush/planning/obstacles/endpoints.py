@@ -1,12 +1,14 @@
 """Starts and goals at which the object itself cannot be, told before anything is searched for."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...errors import InputError
 from ...geometry import Outline, inverse, transform
 from ...geometry.collision import Body, World, pose_clearance
 from ...geometry.pose import Array
-from ...problem import Scene
+from ...problem import Scene, Workspace
 
 SIDES = ("left", "lower", "right", "upper")
 # Rounding of drawings and poses [m].
@@ -26,6 +28,33 @@ def check_endpoints(scene: Scene) -> None:
             continue
         for k, obstacle in enumerate(scene.workspace.obstacles):
             _check_obstacle(scene, key, pose, k, obstacle)
+
+
+def check_region(scene: Scene) -> None:
+    """Refuses a start region of which a part is outside, in an obstacle, or nearer to either than is allowed.
+
+    Raises:
+        InputError: names the side or the obstacle.
+    """
+    from ...simulation.tube import region_clearance
+
+    known, space, need = scene.object.uncertainty, scene.workspace, scene.planning.clearance
+    if known is None or known.start is None:
+        return
+    things = [(f"obstacle {k}", Workspace(None, [o])) for k, o in enumerate(space.obstacles)]
+    if space.bounds is not None:
+        things.append(("the bounds", Workspace(space.bounds)))
+    for name, alone in things:
+        room = region_clearance(replace(scene, workspace=alone), known.start)
+        if room is not None and room < need - TOUCHING:
+            raise InputError(
+                f"somewhere in the start region the object is {1000 * room:.2f} mm from {name}, and"
+                f" {1000 * need:.2f} mm are asked for"
+                if room > 0
+                else f"somewhere in the start region the object overlaps or leaves {name}",
+                key="object.uncertainty.start",
+                hint="A smaller region, or a start further away, would do.",
+            )
 
 
 def _check_bounds(scene: Scene, key: str, pose: Array) -> None:

@@ -217,14 +217,18 @@ class Search:
         self._keep(self.chains)
         return self.best
 
-    def offer(self, path: Path) -> bool:
-        """Takes a path from elsewhere if it keeps the clearance."""
+    def clear(self, path: Path) -> bool:
+        """Whether a path keeps the clearance; not one without pieces."""
         from .kernels import path_clear
 
         if not path.pieces:
             return False
         pushes, letters, amounts = (np.array(column) for column in zip(*path.pieces, strict=True))
-        if not path_clear(self.query.arrays, path.start, pushes, letters, amounts):
+        return bool(path_clear(self.query.arrays, path.start, pushes, letters, amounts))
+
+    def offer(self, path: Path) -> bool:
+        """Takes a path from elsewhere if it keeps the clearance."""
+        if not self.clear(path):
             return False
         self._take(path)
         self._add(path)
