@@ -176,25 +176,27 @@ class AmongObstacles:
         keeping = f" with {need:.2f} mm of clearance" if need > 0 else ""
         if self.complaint and not search.nodes:
             return self.complaint
+        less = ", less clearance (planning.margin.clearance)" if need > 0 else ""
         way, wide = (2000 * radius for radius in widest_way(self.query))
-        if search.closed or way < 0.99 * wide:  # over finer cells than the search's own
-            room = f"no way is wider than about {way:.1f} mm" if way > 0 else "nothing gets through at all"
+        if search.closed or way < 0.999 * wide:
+            room = f"no way is wider than {way:.1f} mm" if way > 0 else "nothing gets through at all"
             return (
                 f"the object does not fit through from the start to the goal{keeping}.\n"
                 f"{room}, and the object is {wide:.1f} mm wide (the largest disc inside it).\n"
-                "A wider gap, less clearance (planning.margin.clearance) or another start or goal would help."
+                f"A wider gap{less} or another start or goal would help."
             )
         head = f"no way{keeping} was found"
         if self.stopped_by == "time_limit":
             head = f"stopped by time_limit after {self.scene.planning.time_limit:g} s"
         finest = f" in cells down to {1000 * search.finest:.1f} mm" if np.isfinite(search.finest) else ""
+        pushes = f"{self.query.fleet.size} pushes" if self.query.fleet.size > 1 else "the only push"
         refused = (
             f"\n{self.refused} ways were refused, the last because {self.complaint}" if self.refused else ""
         )
         return (
             f"{head}: {search.nodes} poses were searched from the start and from the goal with"
-            f" {self.query.fleet.size} pushes{finest}.{refused}\n"
-            "More time (time_limit, iterations), less clearance or other pushes may help."
+            f" {pushes}{finest}.{refused}\n"
+            f"More time (time_limit, iterations){less} or other pushes may help."
         )
 
     @property
