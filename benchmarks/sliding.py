@@ -5,7 +5,8 @@
 N random queries (default 50) of each object or of the named ones, starts up to 200 mm from the goal at any heading.
 Each plan is rolled out in the plant as a whole, every push from where the last one left the object. With --noise
 fingers have a friction that the planner does not know, the pose is seen with noise, and after each push the rest of
-the plan is adjusted, or a new one made where that is not possible.
+the plan is adjusted, or a new one made where that is not possible, until the object is where it should be, as often as
+`flatpush track` would at most; the pushes counted are those made.
 """
 
 import sys
@@ -14,6 +15,7 @@ import time
 import numpy as np
 
 import flatpush as fp
+from flatpush.control.tracking.slides import MOST_SLIDES
 from flatpush.geometry import Outline, pose_error
 from flatpush.geometry.pose import Array
 from flatpush.planning.sliding import SlidePlanner
@@ -22,7 +24,6 @@ from flatpush.simulation.plant import Plant
 TIP = 0.0025
 FARTHEST = 0.2
 NEAR, NEAR_ANGLE = 1e-3, np.deg2rad(1.0)
-LOOKS = 12  # pushes under noise
 SEEN = np.array([2e-4, 2e-4, np.deg2rad(0.2)])  # standard deviation of the pose seen
 FRICTION = 0.05  # of fingers that are believed to have none
 
@@ -70,7 +71,8 @@ def main(count: int, noisy: bool, names: list[str]) -> None:
         for _ in range(count):
             pose = drawn(rng)
             table, rest = plant_of(thing, FRICTION) if noisy else plant, ()
-            for _ in range(LOOKS if noisy else 1):
+            looks = 0
+            for looks in range(1, MOST_SLIDES + 1 if noisy else 2):
                 seen = pose + noisy * SEEN * rng.normal(size=3)
                 began = time.process_time()
                 plan = planner.continued(rest, seen, np.zeros(3)) or planner.plan(seen, np.zeros(3))
@@ -81,7 +83,7 @@ def main(count: int, noisy: bool, names: list[str]) -> None:
                 if within(pose, 1.5):
                     break
             good += within(pose, 1.0 + noisy)
-            numbers.append(len(plan.pushes))
+            numbers.append(looks if noisy else len(plan.pushes))
             misses.append(np.hypot(*pose[:2]) if plan.pushes else np.inf)
         print(
             f"{name}: {good} of {count} within {1 + noisy} mm and {1 + noisy}°; median miss"
