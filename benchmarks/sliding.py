@@ -72,7 +72,8 @@ def main(count: int, noisy: bool, names: list[str]) -> None:
             pose = drawn(rng)
             table, rest = plant_of(thing, FRICTION) if noisy else plant, ()
             looks = 0
-            for looks in range(1, MOST_SLIDES + 1 if noisy else 2):
+            for _ in range(MOST_SLIDES if noisy else 1):
+                looks += 1
                 seen = pose + noisy * SEEN * rng.normal(size=3)
                 began = time.process_time()
                 plan = planner.continued(rest, seen, np.zeros(3)) or planner.plan(seen, np.zeros(3))
