@@ -124,19 +124,18 @@ def straight_force(contact: PointContact, surface: LimitSurface) -> Array:
         )
     if miss >= -1e-9:
         raise NoDubinsReduction(
-            f"the friction cone does not strictly contain the force that pushes straight: it lies"
-            f" {np.rad2deg(abs(angle)):.1f}° from the normal, the cone's edge {np.rad2deg(contact.half_angle):.1f}°"
-            f" (off by {np.rad2deg(max(miss, 0.0)):.1f}°), so every sticking motion turns the same way. {_help(angle)}",
+            f"the friction cone does not strictly contain the force that pushes straight (off by"
+            f" {np.rad2deg(max(miss, 0.0)):.1f}°): every sticking motion turns the same way. {_help(angle)}",
             float(np.rad2deg(max(miss, 0.0))),
         )
     return force
 
 
 def _help(angle: float, margin: float = 0.0) -> str:
-    contact = "a contact nearer to the line of the normal through the centre of friction would help"
+    contact = "a contact nearer to the normal through the centre of friction would help"
     if abs(angle) > np.deg2rad(80):
         return f"No sensible friction would do; {contact}"
-    return f"More friction than {np.tan(abs(angle)) / (1 - margin):.2f} or {contact}"
+    return f"Friction above {np.tan(abs(angle)) / (1 - margin):.2f} or {contact}"
 
 
 def _root(contact: PointContact, surface: LimitSurface) -> Array:

@@ -158,7 +158,9 @@ class AmongObstacles:
         if room < need:
             self.refused += 1
             self.complaint = (
-                f"the pusher comes too near to something between two pushes ({1000 * room:.2f} mm)."
+                f"the pusher comes within {1000 * room:.2f} mm of something between two pushes."
+                if room > 0
+                else "the pusher touches something between two pushes."
             )
             return None
         self.best = self.search.value(path) if self.layers is None else path.cost
@@ -185,14 +187,18 @@ class AmongObstacles:
                 f"{room}, and the object is {wide:.1f} mm wide (the largest disc inside it).\n"
                 f"A wider gap{less} or another start or goal would help."
             )
-        head = f"no way{keeping} was found"
+        within = f" in {self.scene.planning.iterations} iterations" if self.stopped_by == "iterations" else ""
+        head = f"no way{keeping} was found{within}"
         if self.stopped_by == "time_limit":
             head = f"stopped by time_limit after {self.scene.planning.time_limit:g} s"
         finest = f" in cells down to {1000 * search.finest:.1f} mm" if np.isfinite(search.finest) else ""
         pushes = f"{self.query.fleet.size} pushes" if self.query.fleet.size > 1 else "the only push"
-        refused = (
-            f"\n{self.refused} ways were refused, the last because {self.complaint}" if self.refused else ""
-        )
+        refused = ""
+        if self.refused:
+            ways = (
+                "one way was refused" if self.refused == 1 else f"{self.refused} ways were refused, the last"
+            )
+            refused = f"\n{ways} because {self.complaint}"
         return (
             f"{head}: {search.nodes} poses were searched from the start and from the goal with"
             f" {pushes}{finest}.{refused}\n"

@@ -321,7 +321,13 @@ class Planner:
                 pose_clearance(world, body, pose) >= need
             ):
                 fits.append(pose)
-        check_endpoints(replace(scene, goal=fits[0] if fits else (*place, tried[0])))
+        try:
+            check_endpoints(replace(scene, goal=fits[0] if fits else (*place, tried[0])))
+        except InputError as error:
+            if error.key != "goal":
+                raise
+            rule = f"{error.rule} when it is turned by {np.rad2deg(tried[0]):.0f}°, and it fits at no other angle"
+            raise InputError(rule, key="goal") from None
         return np.array(fits)
 
     @cached_property
