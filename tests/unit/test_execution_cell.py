@@ -14,7 +14,7 @@ from tests.extras import extra
 import flatpush as fp
 from flatpush.execution import DONE, open_robot, run
 from flatpush.execution.cell.film import film, window
-from flatpush.execution.cell.model import MASS, Physics, cell_xml, convex_pieces
+from flatpush.execution.cell.model import MASS, Physics, cell_xml, convex_pieces, joined
 from flatpush.execution.cell.robot import DISPLAYS, CellRobot, load
 from flatpush.execution.simulated import Unknown
 from flatpush.geometry import pose_error
@@ -78,6 +78,24 @@ def test_feet_carry_their_share_while_they_slide_and_two_fingers_hold_a_turn(thr
     error = pose_error(ended.object, plan.scene.goal)
     assert np.hypot(*error[:2]) < 0.0005
     assert abs(error[2]) < math.radians(0.3)
+
+
+def test_many_feet_are_joined_into_few_that_press_alike():
+    """A rim of 48 corners had 48 feet, and a run took twice as long."""
+    angles = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    places, loads = np.column_stack([0.03 * np.cos(angles), 0.02 * np.sin(angles)]), np.full(48, 1 / 48)
+    few, heavy = joined(places, loads, 16)
+    assert len(heavy) == 16
+    assert heavy.sum() == pytest.approx(1)
+    assert heavy @ few == pytest.approx(loads @ places, abs=1e-15)
+    before, after = ((w * np.sum(p**2, axis=1).T).sum() for p, w in ((places, loads), (few, heavy)))
+    assert 0.98 * before < after < before
+    assert joined(places[:5], loads[:5], 16)[0] == pytest.approx(places[:5], abs=0)
+    outline = fp.Object(places, "outline", friction=0.3)
+    xml = cell_xml(
+        fp.Scene(outline, (0.0, 0.0, 0.0), pusher=fp.Pusher(lift=0.04)), np.zeros((1, 2)), Physics(0.3)
+    )
+    assert xml.count('<pair geom1="floor"') == 16
 
 
 def test_outlines_become_convex_pieces():

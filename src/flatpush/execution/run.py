@@ -1,5 +1,6 @@
 """A plan on a robot: one loop that owns the clock, watches limits and feedback in every cycle, and always stops."""
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -346,8 +347,8 @@ class _Watch:
     last: Array | None = None
     notes: dict[str, float] = field(default_factory=dict)
 
-    def feedback(self, state: State, now: float) -> str:
-        """Why a robot with this feedback must stop, or ""."""
+    def feedback(self, state: State, now: float, off: float) -> str:
+        """Why a robot with this feedback, so far from where it was sent [m], must stop, or ""."""
         limits = self.robot.limits
         if state.fault:
             return f"the robot has a fault: {state.fault}"
@@ -355,19 +356,19 @@ class _Watch:
             return f"the feedback is {now - state.stamp:.3f} s old, more than {limits.age:g} s"
         if outside := limits.outside(state.pose, MEASURED):
             return f"the tool is where it may not be: {outside}"
-        if self.off(state) > limits.deviation:
+        if off > limits.deviation:
             return (
-                f"the tool is {1000 * self.off(state):.1f} mm from where it was sent, more than"
+                f"the tool is {1000 * off:.1f} mm from where it was sent, more than"
                 f" {1000 * limits.deviation:g} mm"
             )
         return ""
 
     def off(self, state: State) -> float:
-        return 0.0 if self.last is None else float(np.linalg.norm((state.pose - self.last)[:3]))
+        return 0.0 if self.last is None else math.dist(state.pose[:3], self.last[:3])
 
     def target(self, wanted: Wanted) -> str:
         """Why a target must not be sent, or ""."""
-        limits, speed = self.robot.limits, float(np.linalg.norm(wanted.twist[:3]))
+        limits, speed = self.robot.limits, math.hypot(*wanted.twist[:3])
         if outside := limits.outside(wanted.pose):
             return outside
         if speed > limits.speed * (1 + SLACK):
@@ -401,8 +402,9 @@ def stream(
                 clock.wait(due)
                 now = clock.now()
                 late, state = now - due, robot.state()
+                off = watch.off(state)
                 outcome = f"a cycle came {late:.3f} s late, more than {age:g} s" if late > age else ""
-                outcome = outcome or watch.feedback(state, now)
+                outcome = outcome or watch.feedback(state, now, off)
                 if outcome:
                     break
                 wanted = motion.step(now, state)
@@ -411,7 +413,6 @@ def stream(
                 outcome = wanted.outcome or watch.target(wanted)
                 if outcome:
                     break
-                off = watch.off(state)
                 sent = robot.send(Target(now + period, wanted.pose, wanted.twist))
                 watch.last = sent.pose
                 seen = _object(motion, robot)

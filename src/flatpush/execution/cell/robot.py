@@ -175,9 +175,11 @@ class CellRobot(DryRun):
             end = target.pose if share == 1 else before + share * (target.pose - before)
             here, there = self._drawn, self._drives(end)
             rate = (there - here) / max(moving, 1)
-            for k in range(1, moving + 1):
-                self._data.ctrl[:] = here + (k + LEAD / STEP) * rate
-                self._mujoco.mj_step(self._model, self._data)
+            leads = here + (np.arange(1, moving + 1)[:, None] + LEAD / STEP) * rate
+            step, model, data, ctrl = self._mujoco.mj_step, self._model, self._data, self._data.ctrl
+            for lead in leads:
+                ctrl[:] = lead
+                step(model, data)
             self._held, self._drawn = end, there
         if moving < steps:
             self._data.ctrl[:] = self._drawn
