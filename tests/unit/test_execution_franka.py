@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.broken_off import PHASES, ends, interrupts
 from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
@@ -95,6 +96,24 @@ def test_a_robot_that_freezes_ends_the_run_and_does_not_go_on_afterwards():
         # Each answer is a step of the robot or more, of 1 ms. It comes to rest near where it was.
         assert np.abs(moved).max() < 0.02
         assert np.ptp(moved[-100:], axis=0).max() < 1e-3
+
+
+@pytest.mark.slow
+def test_interrupts_and_ends_of_the_robot_stop_in_every_phase(triangle, tmp_path):
+    pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
+    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
+    plan = fp.plan(fp.Scene(triangle, (-0.01, -0.06, 0.1), pusher=pusher, pushes=pushes))
+    base = (0.4, 0.0, 0.2, -math.pi / 2)
+    joints = replace(ARM, base=base).joints(home_of(plan))
+    with Controller(joints=joints) as controller, robot_at(controller.host, base=base) as robot:
+        assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
+    for phase in PHASES:
+        with (
+            Controller(joints=joints) as controller,
+            robot_at(controller.host, base=base, silence=2.0) as robot,
+        ):
+            more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
+        assert 0 <= more <= 11, outcome
 
 
 @pytest.mark.slow
