@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Callable, Iterable
 from io import StringIO
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -280,8 +281,8 @@ def _points(entity: "DXFEntity") -> Callable[[float], Array] | None:
         entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & _FRAME_POINT]
         if not len(entity.vertices):
             return None
-    if entity.dxftype() == "SPLINE" and (unclamped := _unclamped(entity)) is not None:
-        return unclamped
+    if entity.dxftype() == "SPLINE" and (spline := _spline(entity)) is not None:
+        return spline
     path = paths.make_path(entity)
     if not len(path):
         return None
@@ -306,17 +307,18 @@ def _if_readable(entity: "DXFEntity") -> Callable[[float], Array] | None:
         return None
 
 
-def _unclamped(spline: "DXFEntity") -> Callable[[float], Array] | None:
-    """The polygon of a B-spline whose knots go beyond its ends, as those of a periodic one do; None for others.
+def _spline(spline: "DXFEntity") -> Callable[[float], Array] | None:
+    """The polygon of a B-spline with as many knots as it should have; None for others, as those through fit points.
 
-    Its curve lies between the knots of numbers p and n (degree p, n control points); ezdxf draws it over all knots.
+    Its curve lies between the knots of numbers p and n (degree p, n control points); ezdxf draws one whose knots go on
+    over all of them, and puts cubic curves, which swing at corners, in the place of other degrees.
     """
     knots, degree = np.array(spline.knots), int(spline.dxf.degree)
     controls, count = np.array(spline.control_points), len(spline.control_points)
     if not count or len(knots) != count + degree + 1:
         return None
     first, last = float(knots[degree]), float(knots[count])
-    if (knots[0] >= first and knots[-1] <= last) or last <= first:
+    if last <= first or np.any(np.diff(knots) < 0):
         return None
     from scipy.interpolate import BSpline
 
@@ -324,8 +326,18 @@ def _unclamped(spline: "DXFEntity") -> Callable[[float], Array] | None:
     curve = BSpline(knots, np.column_stack([controls[:, :2] * weights[:, None], weights]), degree)
 
     def at(t: Array) -> Array:
-        x, y, w = curve(first + t * (last - first)).T
+        x, y, w = curve(t).T
         return np.column_stack([x / w, y / w])
 
+    inside = np.unique(np.clip(knots, first, last))  # between which it is smooth
     size = extent(controls[:, :2])
-    return lambda tolerance: flattened(at, tolerance if np.isfinite(tolerance) else 0.1 * size)
+
+    def points(tolerance: float) -> Array:
+        distance = tolerance if np.isfinite(tolerance) else 0.1 * size
+        parts = [
+            flattened(lambda t, a=a, b=b: at(a + t * (b - a)), distance)  # type: ignore[misc]
+            for a, b in pairwise(inside.tolist())
+        ]
+        return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+
+    return points

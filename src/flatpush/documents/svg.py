@@ -237,6 +237,8 @@ class _Reader:
         if moving and not page:
             refusal = f"it moves (<{moving}>)"
         matrix = joined(state.matrix, transform(element, style))
+        if np.linalg.det(matrix[:, :2]) == 0:
+            hidden = hidden or "not visible (scaled to nothing)"
         if page and np.any(matrix != state.matrix):
             raise ValueError("it has a transform, which programs read differently for a whole page")
         result = replace(
@@ -295,6 +297,9 @@ class _Reader:
             self.unreadable(element, state, f"the {away} of its symbol is not read")
             return
         style = style_of(target, self.rules, state.style)
+        if target.tag == "symbol" and style.get("display", "").lower() == "none":
+            self.unreadable(element, state, "its symbol has display: none, which browsers pass over")
+            return
         state = self.inside(target, state, style, False)
         if state.hidden:
             self.left_out(target, state.hidden)
