@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -68,6 +68,9 @@ class WorldArrays(NamedTuple):
     near: np.ndarray
 
 
+Cells = tuple[Grid, np.ndarray, np.ndarray, np.ndarray]
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """What a moving body must keep clear of.
@@ -109,10 +112,7 @@ class World:
     @cached_property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners of a box about each feature, both of shape (n, 2) [m]."""
-        F = self.features
-        a, b = np.column_stack([F["ax"], F["ay"]]), np.column_stack([F["bx"], F["by"]])
-        r = F["radius"][:, None]
-        return np.minimum(a, b) - r, np.maximum(a, b) + r
+        return _boxes(self.features)
 
     @cached_property
     def owners(self) -> np.ndarray:
@@ -133,27 +133,39 @@ class World:
         return WorldArrays(self.features, self.edges, Box(*self.bounds.tolist()), *self._cells, *scratch)
 
     @cached_property
-    def _cells(self) -> tuple["Grid", np.ndarray, np.ndarray, np.ndarray]:
-        """The grid, where the list of each cell begins, the lists, and winding numbers."""
-        F = self.features
-        if not len(F):
-            grid = Grid(0.0, 0.0, 1.0, 1, 1, *REFERENCE)
-            return grid, np.zeros(2, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64)
-        low, high = self.boxes
-        corner, size = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
-        cells = min(CELLS * len(F) + 16, MOST_CELLS)
-        cell = float(np.sqrt(np.prod(size + 1e-3 * size.max()) / cells)) + 1e-12
-        corner = corner - 1e-3 * cell
-        nx, ny = (int(n) + 1 for n in (size + 2e-3 * cell) / cell)
-        grid = Grid(float(corner[0]), float(corner[1]), 1.0 / cell, nx, ny, *REFERENCE)
-        pairs = _cells_of(F, self.edges, corner, cell, nx, ny)
-        order = np.argsort(pairs[:, 0], kind="stable")
-        pairs = pairs[order]
-        starts = np.searchsorted(pairs[:, 0], np.arange(nx * ny + 1))
-        reference = corner + cell * (
-            np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) + REFERENCE
-        )
-        return grid, starts.astype(np.int64), pairs[:, 1].copy(), _winding(F[: self.edges], reference, nx, ny)
+    def _cells(self) -> Cells:
+        # While something is dragged the same obstacles are laid out for plan after plan.
+        return _laid_out(self.features.tobytes(), self.edges)
+
+
+def _boxes(F: np.ndarray) -> tuple[Array, Array]:
+    a, b = np.column_stack([F["ax"], F["ay"]]), np.column_stack([F["bx"], F["by"]])
+    r = F["radius"][:, None]
+    return np.minimum(a, b) - r, np.maximum(a, b) + r
+
+
+@lru_cache(maxsize=8)
+def _laid_out(features: bytes, edges: int) -> Cells:
+    """The grid over features, where the list of each cell begins, the lists, and winding numbers."""
+    if not features:
+        grid = Grid(0.0, 0.0, 1.0, 1, 1, *REFERENCE)
+        return grid, np.zeros(2, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64)
+    F = np.frombuffer(features, FEATURE)
+    low, high = _boxes(F)
+    corner, size = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
+    cells = min(CELLS * len(F) + 16, MOST_CELLS)
+    cell = float(np.sqrt(np.prod(size + 1e-3 * size.max()) / cells)) + 1e-12
+    corner = corner - 1e-3 * cell
+    nx, ny = (int(n) + 1 for n in (size + 2e-3 * cell) / cell)
+    grid = Grid(float(corner[0]), float(corner[1]), 1.0 / cell, nx, ny, *REFERENCE)
+    pairs = _cells_of(F, edges, corner, cell, nx, ny)
+    order = np.argsort(pairs[:, 0], kind="stable")
+    pairs = pairs[order]
+    starts = np.searchsorted(pairs[:, 0], np.arange(nx * ny + 1))
+    reference = corner + cell * (
+        np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) + REFERENCE
+    )
+    return grid, starts.astype(np.int64), pairs[:, 1].copy(), _winding(F[:edges], reference, nx, ny)
 
 
 def _cells_of(F: np.ndarray, edges: int, corner: Array, cell: float, nx: int, ny: int) -> np.ndarray:
