@@ -3,7 +3,8 @@
 From a pointer's move to the new path on the screen, while start and goal are dragged: among nothing and among ten
 obstacles; from the start of `flatpush view` to the first plan on the screen, with compiled kernels; and how often the
 object is moved in a second while the pointer pushes it. CPU is that of server and planner together while the pointer
-moves, for each path or step: it does not depend on who else uses the machine.
+moves, for each path or step, and that of the browser: it does not depend much on who else uses the machine. What the
+browser itself takes is seen beside it, by a page on which the pointer moves a circle and nothing else.
 """
 
 import json
@@ -22,6 +23,12 @@ from selenium import webdriver
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "triangle.yaml"
 WAIT = 60  # for anything [s]
+CIRCLE = """data:text/html,<body style="margin:0"><svg width="1280" height="720"><circle id="c" r="20"/></svg><script>
+const c = document.getElementById("c"), times = window.times = [];
+onpointermove = (event) => {
+  c.setAttribute("cx", event.clientX); c.setAttribute("cy", event.clientY);
+  requestAnimationFrame(() => setTimeout(() => times.push(performance.now() - event.timeStamp)));
+};</script>"""
 
 
 def served(scene: Path) -> tuple[subprocess.Popen[str], str, float]:
@@ -66,21 +73,28 @@ def wait(browser: webdriver.Chrome, condition: str) -> None:
         time.sleep(0.002)
 
 
-def spent(server: subprocess.Popen[str]) -> float:
-    """CPU time of the server and its planner so far [s]."""
-    numbers = [server.pid]
+def spent(first: int) -> float:
+    """CPU time of a process and of all that it started, so far [s]."""
+    parents, ticks = dict[int, int](), dict[int, int]()
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
         except OSError:  # it has just ended
             continue
-        if int(fields[1]) == server.pid:
-            numbers.append(int(folder.name))
-    ticks = 0
-    for number in numbers:
-        fields = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
-        ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf("SC_CLK_TCK")
+        number = int(folder.name)
+        parents[number], ticks[number] = int(fields[1]), int(fields[11]) + int(fields[12])
+    total, family = 0, {first}
+    while family:
+        total += sum(ticks[number] for number in family)
+        family = {number for number, parent in parents.items() if parent in family}
+    return total / os.sysconf("SC_CLK_TCK")
+
+
+def said(times: list[float], cpu: dict[str, float]) -> dict[str, float]:
+    """Quantiles of times [ms], and CPU times [s] for each of them."""
+    middle, most = np.quantile(times, [0.5, 0.95]) if times else (np.nan, np.nan)
+    each = {f"CPU of {name} [ms]": round(1000 * value / max(len(times), 1), 1) for name, value in cpu.items()}
+    return {"median [ms]": round(float(middle), 1), "95 % [ms]": round(float(most), 1), **each}
 
 
 def stroke(browser: webdriver.Chrome, moves: int, place: Callable[[int], tuple[float, float]]) -> None:
@@ -117,10 +131,10 @@ def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
 
 
 def dragged(
-    browser: webdriver.Chrome, server: subprocess.Popen[str], thing: str, moves: int
-) -> tuple[list[float], float]:
-    """Latencies [ms] of a drag at 60 moves a second, and the CPU time that it took [s]."""
-    cpu = spent(server)
+    browser: webdriver.Chrome, cpu: Callable[[], dict[str, float]], thing: str, moves: int
+) -> tuple[list[float], dict[str, float]]:
+    """Latencies [ms] of a drag at 60 moves a second, and the CPU times that it took [s]."""
+    before = cpu()
     x, y = browser.execute_script(
         "const b = document.querySelector(arguments[0]).getBoundingClientRect();"
         "return [b.x + b.width / 2, b.y + b.height / 2];",
@@ -133,9 +147,10 @@ def dragged(
 
     browser.execute_script("flatpush.latencies.length = 0")
     stroke(browser, moves, place)
-    cpu = spent(server) - cpu
+    after = cpu()
     wait(browser, "!flatpush.busy")
-    return [float(v) for v in browser.execute_script("return flatpush.latencies")], cpu
+    times = [float(v) for v in browser.execute_script("return flatpush.latencies")]
+    return times, {name: after[name] - before[name] for name in after}
 
 
 def main() -> None:
@@ -152,12 +167,22 @@ def main() -> None:
         options.add_argument(flag)
     browser = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
     found: dict[str, object] = {"moves": moves}
+    driver = browser.service.process.pid  # type: ignore[union-attr]
     size = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
+        browser.get(CIRCLE)
+        used = spent(driver)
+        stroke(browser, moves, lambda k: (300 + k, 300))
+        times = [float(v) for v in browser.execute_script("return times")]
+        found["a circle moved, and nothing else"] = said(times, {"the browser": spent(driver) - used})
         with tempfile.TemporaryDirectory() as folder:
             for name, scene in (("free", EXAMPLE), ("ten obstacles", crowded(Path(folder)))):
                 server, link, began = served(scene)
+
+                def cpu(first: int = server.pid) -> dict[str, float]:
+                    return {"server and planner": spent(first), "the browser": spent(driver)}
+
                 browser.get(link)
                 wait(browser, "window.flatpush && flatpush.answered")
                 found[f"{name}: first plan after the start of the server [s]"] = round(
@@ -165,22 +190,14 @@ def main() -> None:
                 )
                 wait(browser, "!flatpush.busy")
                 for thing in ("start", "goal"):
-                    times, cpu = dragged(browser, server, thing, moves)
-                    found[f"{name}: {thing} dragged"] = {
-                        "paths": len(times),
-                        "median [ms]": round(float(np.median(times)), 1),
-                        "95 % [ms]": round(float(np.percentile(times, 95)), 1),
-                        "CPU [ms]": round(1000 * cpu / max(len(times), 1), 1),
-                    }
+                    times, used_up = dragged(browser, cpu, thing, moves)
+                    found[f"{name}: {thing} dragged"] = {"paths": len(times), **said(times, used_up)}
                 if name == "free":
-                    cpu, began = spent(server), time.perf_counter()
+                    before, began = cpu(), time.perf_counter()
                     times = pushed(browser, moves)
-                    found["pushed by the pointer"] = {
-                        "steps a second": round(len(times) / (time.perf_counter() - began), 1),
-                        "median [ms]": round(float(np.median(times)), 1),
-                        "95 % [ms]": round(float(np.percentile(times, 95)), 1),
-                        "CPU [ms]": round(1000 * (spent(server) - cpu) / max(len(times), 1), 1),
-                    }
+                    rate = round(len(times) / (time.perf_counter() - began), 1)
+                    used_up = {key: value - before[key] for key, value in cpu().items()}
+                    found["pushed by the pointer"] = {"steps a second": rate, **said(times, used_up)}
                 server.send_signal(signal.SIGINT)
                 server.wait(WAIT)
     finally:

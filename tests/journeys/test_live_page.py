@@ -156,6 +156,8 @@ def test_an_obstacle_is_added_blocks_is_moved_and_removed(page):
     assert "clearance" in dict(page.plan["proved"])
     page.drag(page.middle("#obstacles .body"), page.middle("#goal .body"))
     assert "at the goal the object overlaps obstacle 0" in page.text("reason")
+    named = "return [...document.querySelectorAll('#table .blamed')].map((node) => node.dataset.item)"
+    assert page.js(named) == ["obstacle:0", "goal"]
     assert page.text("cost") == "–"
     page.press("r")
     corners = page.scene["workspace"]["obstacles"][0]
@@ -164,6 +166,7 @@ def test_an_obstacle_is_added_blocks_is_moved_and_removed(page):
     page.settle()
     assert page.scene["workspace"]["obstacles"] == []
     assert page.plan["status"] == "solved"
+    assert page.js(named) == []
 
 
 def test_a_corner_of_an_obstacle_is_moved_and_one_is_put_between(page):

@@ -179,15 +179,14 @@ class Planner:
         self._waiting: dict[int, asyncio.Queue[str]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self.compiling = ""  # what is told while something is being compiled
-        self._start()
+        # A fork of a process that has no threads and no sockets yet is there at once; later ones are spawned.
+        self._start("fork" if sys.platform == "linux" and threading.active_count() == 1 else "spawn")
         self._requests.send((0, 1, "open", {"file": asked.file, "of": asked.of}))
 
-    def _start(self) -> None:
-        """A fork of a process without threads is there at once; what takes the place of one that died is spawned."""
-        forked = sys.platform == "linux" and threading.active_count() == 1
-        context = multiprocessing.get_context("fork" if forked else "spawn")
+    def _start(self, how: str) -> None:
         self._requests, theirs = multiprocessing.Pipe()
-        ends = (theirs, self._requests) if forked else (theirs,)
+        ends = (theirs, self._requests) if how == "fork" else (theirs,)
+        context = multiprocessing.get_context(how)
         self._process = context.Process(target=work, args=ends, daemon=True)  # type: ignore[attr-defined]
         self._process.start()
         theirs.close()
@@ -233,7 +232,7 @@ class Planner:
         try:
             self._requests.send((client, number, kind, value))
         except OSError:  # it died; whoever asks next has a new one
-            self._start()
+            self._start("spawn")
             assert self._loop is not None
             self.attach(self._loop)
             if self.shown.plan is not None:

@@ -19,6 +19,8 @@ const CHOICES = [
   ["cost", "planning.cost", COSTS, ["path of the flat point", "path of the pusher", "time"]],
 ];
 
+const STALE = ["title", "subtitle", "duration", "proved"];   /* that a sketch does not tell */
+
 const read = (scene, key) => key.split(".").reduce((value, step) => (value === undefined ? undefined : value[step]), scene);
 
 function write(scene, key, value) {
@@ -31,7 +33,13 @@ export class Panel {
     this.model = model; this.player = player;
     this.inputs = [];
     this.poses(); this.sliders();
-    model.addEventListener("changed", () => this.show());
+    model.addEventListener("changed", ({ detail: { stamp } }) => { if (stamp) this.soon(); else this.show(); });
+  }
+
+  /* While something is dragged the numbers follow ten times a second: more nobody reads, and to paint them takes as
+     long as to paint the table. */
+  soon() {
+    if (!this.timer) this.timer = setTimeout(() => { this.show(); if (this.model.plan && this.model.plan.sketch) this.sketch(this.model.plan); }, 100);
   }
 
   poses() {
@@ -88,6 +96,8 @@ export class Panel {
   /* The scene in the inputs; one that is being typed in stays as it is. */
   show() {
     const { scene } = this.model;
+    clearTimeout(this.timer);
+    this.timer = 0;
     for (const [input, value] of this.inputs) {
       const shown = value(scene), open = shown === "free" || shown === undefined;
       if (input === document.activeElement && input.type === "number" && !open && input.valueAsNumber === shown) continue;
@@ -97,7 +107,7 @@ export class Panel {
     }
     this.free.checked = scene.goal[2] === "free";
     const time = scene.planning.cost === "time";
-    this.costUnit.small.textContent = time ? "s" : "mm";
+    say(this.costUnit.small, time ? "s" : "mm");
     this.costUnit.range.max = time ? 10 : 100;
     for (const input of this.spacing) input.disabled = scene.pusher.fingers !== 2;
     find("undo").disabled = !this.model.before.length;
@@ -107,9 +117,9 @@ export class Panel {
   /* The numbers of an answer. */
   tell(plan) {
     const solved = plan.status === "solved";
-    for (const id of ["title", "subtitle", "duration", "proved"]) find(id).classList.toggle("stale", Boolean(plan.sketch));
-    if (plan.sketch) { this.sketch(plan); return; }
+    if (plan.sketch) { this.soon(); return; }
     document.title = plan.title || `${this.model.scene.object.name}: no plan`;
+    for (const id of STALE) find(id).classList.remove("stale");
     say(find("title"), document.title);
     say(find("subtitle"), solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0]);
     const spent = plan.planning_time;
@@ -130,6 +140,7 @@ export class Panel {
 
   /* Of a path while something is dragged: the cost and the pushes; what else is told stays meanwhile, pale. */
   sketch(plan) {
+    for (const id of STALE) find(id).classList.add("stale");
     say(find("cost"), plan.cost.split(" (")[0]);
     say(find("count"), String(plan.traces.length));
     say(find("spent"), number(1000 * plan.planning_time, 0) + " ms");

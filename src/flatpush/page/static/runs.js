@@ -153,7 +153,7 @@ export class ManyRuns {
     find("runsdone").textContent = "The first ones are on their way.";
   }
 
-  clear() { this.number = 0; this.told = null; this.draw(); }
+  clear() { if (!this.number) return; this.number = 0; this.told = null; this.draw(); }
 
   draw() {
     const { told } = this, tube = find("tube"), table = find("runserrors");

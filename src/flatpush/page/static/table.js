@@ -224,6 +224,15 @@ export class Table {
       return svg("g", { class: "place", transform: `translate(${x} ${y})` }, svg("path", { d: `M${-d} ${-d}L${d} ${d}M${-d} ${d}L${d} ${-d}` }), svg("title", {}, `${spot.name}: ${spot.refusal}`));
     }));
     group.classList.toggle("stale", Boolean(plan && plan.stale));
+    this.blame(plan && plan.status !== "solved" ? plan.reason || "" : "");
+  }
+
+  /* What the reason names stands out: the end that does not fit, and what it meets. */
+  blame(reason) {
+    const named = [...reason.matchAll(/\bobstacle (\d+)/g)].map(([, k]) => Number(k));
+    [...find("obstacles").children].forEach((node, k) => node.classList.toggle("blamed", named.includes(k)));
+    for (const name of ENDS) find(name).classList.toggle("blamed", reason.includes(`at the ${name} `));
+    find("bounds").classList.toggle("blamed", reason.includes(" side of the bounds"));
   }
 
   /* ---- the pointer ---- */
