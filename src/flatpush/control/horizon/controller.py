@@ -7,18 +7,17 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import FlatpushError, InputError
-from ...geometry import compose, pose_error, relative, transform
+from ...geometry import compose, pose_error, relative
 from ...geometry.pose import Array
 from ...planning import Planner
 from ...problem import Plan, Scene
 from ..laws.formulas import RAMP, point_velocity, wrapped
 from ..laws.push_controller import pusher_velocity
 from ..laws.rest_of_path import Rest, rest_of_path
-from ..laws.steering_model import SteeringModel
 from ..learning.friction_bounds import FrictionBounds
 from ..loop.controller import ARRIVED, AbstractController
 from ..loop.frames import hand, mean_pose, predicted
-from ..loop.limits import Limits, beyond, braking
+from ..loop.limits import Limits, braking
 from ..loop.measurement import Command, Measurement
 from .contact_car import ContactCar
 from .contact_observer import LOST, ContactObserver, nearest_contact
@@ -26,7 +25,7 @@ from .landings import Landing, next_push
 from .push_knowledge import Steering, shared, steering_of
 from .push_path import PushPath
 from .state import HorizonState, LearningWindow
-from .surroundings import GUARD, Surroundings, Thoughts, crowded
+from .surroundings import GUARD, Surroundings, Thoughts, crowded, way_over
 
 # Plans leave this share of the friction cone, feedback may use more of it (contact_observer.EDGE); both cover
 # friction that is a fifth less than believed.
@@ -52,8 +51,6 @@ FAILURES, LEEWAY = 3, 0.15
 LAST, ASTRAY, SKEWED = 1.5, 0.5, 0.7
 # So often it looks where no path is found, before it gives up.
 LOOKS = 3
-# Object and finger keep so far from the bounds, for what a prediction over the camera's latency may be off [m].
-ROOM = 0.002
 # What another landing counts as at least: each begins with the errors of a look at the object [m].
 SWITCHING = 0.03
 
@@ -74,8 +71,6 @@ class HorizonController(AbstractController[HorizonState]):
         learn: whether the steering is learned while the finger sticks.
         body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
-        bounds: xmin, ymin, xmax, ymax [m]; a push ends before the object or the finger would leave them, and another is
-            tried. Paths are planned without regard to them.
         surroundings: what paths, landings and retreats keep clear of; None where nothing is in the way.
     """
 
@@ -90,7 +85,6 @@ class HorizonController(AbstractController[HorizonState]):
     stale: float = 0.5
     sd: float = float(np.deg2rad(0.3))
     noise: tuple[float, float] = (0.0003, float(np.deg2rad(0.3)))
-    bounds: tuple[float, float, float, float] | None = None
     surroundings: Surroundings | None = None
 
     @cached_property
@@ -216,7 +210,7 @@ class HorizonController(AbstractController[HorizonState]):
         if state.landings >= self.landings:
             why = ARRIVED if inside <= 1 else f"still {text} after {state.landings} landings"
             if state.stopped and why != ARRIVED:
-                why += f"; the bounds ended {state.stopped} of the pushes"
+                why += f"; {state.stopped} of the pushes came too near to something"
             return replace(state, mode="done", note=text, outcome=why), self._standing(state)
         cars = self._usable(state)
         if not any(cars):
@@ -225,7 +219,6 @@ class HorizonController(AbstractController[HorizonState]):
         if not any(cars) and state.forgiven:
             state = self._forgotten(state)
             cars = self._usable(state)
-        cars = [car if self._has_room(pose, k) else None for k, car in enumerate(cars)]
         if self.surroundings is not None:
             seed = state.landings + LOOKS * state.stuck
             search = self.surroundings.next_push(cars, pose, self.scene.goal_pose, self._switching, seed)
@@ -233,10 +226,7 @@ class HorizonController(AbstractController[HorizonState]):
             return self._think(replace(state, thoughts=thoughts, thought=0, note=text), thoughts, time)
         found = next_push(cars, pose, self.scene.goal_pose, self._switching, state.landings)
         if found is None:
-            why = "no push can be steered"
-            if self.bounds is not None:
-                why += " where the bounds leave room for the finger"
-            return replace(state, mode="done", outcome=why), self._standing(state)
+            return replace(state, mode="done", outcome="no push can be steered"), self._standing(state)
         place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
         try:
@@ -269,19 +259,10 @@ class HorizonController(AbstractController[HorizonState]):
         place, hand = self.planner.usable[found.push].placement, self.hand(state, time)
         assert place is not None
         assert found.path is not None
-        pusher, pose = self.scene.pusher, found.path.poses[0]
-        contact = compose(pose, place.pose)
-        contact[2] = hand[2] + pose_error(contact, hand)[2]
-        before = compose(pose, compose(place.pose, [-pusher.approach, 0.0, 0.0]))
-        stops = np.array(
-            [
-                [*hand, pusher.lift],
-                [*before[:2], contact[2], pusher.lift],
-                [*before[:2], contact[2], 0],
-                [*contact, 0],
-            ]
+        pose, car = found.path.poses[0], self._usable(state)[found.push]
+        return self._land(
+            state, found, car, pose, way_over(self.scene.pusher, place.pose, pose, hand), text, time
         )
-        return self._land(state, found, self._usable(state)[found.push], pose, stops, text, time)
 
     def _land(
         self,
@@ -341,34 +322,6 @@ class HorizonController(AbstractController[HorizonState]):
             good = car is not None and car.leeway >= LEEWAY and car.radius <= widest
             cars.append(car if good else None)
         return cars
-
-    def _has_room(self, pose: Array, option: int) -> bool:
-        """Whether the finger is inside the bounds where it lands for a push of an object at X_WO, and before."""
-        if self.bounds is None:
-            return True
-        place, pusher = self.planner.usable[option].placement, self.scene.pusher
-        assert place is not None
-        tip = place.tips[0]
-        away = self.scene.object.outline.nearest(tip).normal
-        ends = transform(pose, np.array([tip, tip - pusher.approach * away]))
-        return beyond(ends, self.bounds, pusher.tip_radius) <= 0
-
-    def _leaves(self, model: SteeringModel, pose: Array, hand: Array, velocity: Array) -> bool:
-        """Whether object or finger would be outside the bounds, and farther than now, where a hand with this velocity
-        comes to rest; X_WO and X_WE are those of now."""
-        speed = math.hypot(float(velocity[0]), float(velocity[1]))
-        if self.bounds is None or speed == 0:
-            return False
-        pusher, corners = self.scene.pusher, self.scene.object.outline.polyline()
-        rests = 1 / self.rate + 0.5 * speed / (BRAKE * pusher.acceleration)  # at this speed [s]
-        x, y, turn = (float(v) for v in pose)
-        there = np.array(model.moved(x, y, turn, float(velocity[0]), float(velocity[1]), rests))
-        now = beyond(transform(pose, corners), self.bounds, ROOM)
-        tips = np.array([hand[:2], hand[:2] + rests * velocity[:2]])
-        before, after = (beyond(tip[None], self.bounds, ROOM + pusher.tip_radius) for tip in tips)
-        return beyond(transform(there, corners), self.bounds, ROOM) > max(0.0, now) or after > max(
-            0.0, before
-        )
 
     def _go(self, state: HorizonState, time: float) -> tuple[HorizonState, Command]:
         """To the next stop; then to what comes after it."""
@@ -451,9 +404,6 @@ class HorizonController(AbstractController[HorizonState]):
         speed = min(self.scene.pusher.speed / max(1.0, ratio), end + 1e-9)
         omega = rest.curvature * speed
         velocity = pusher_velocity(m, pose, speed, omega, dt)
-        if self._leaves(m, pose, self.hand(state, time), velocity):
-            ended = replace(self._failed(state), stopped=state.stopped + 1)
-            return self._retreat(ended, time, "the push would leave the bounds")
         if state.path is not None and not self._free(state, state.path, pose, speed, omega):
             ended = replace(state, stopped=state.stopped + 1)
             return self._retreat(ended, time, "the push would come too near to something")

@@ -58,7 +58,7 @@ class HorizonState(ControllerState):
         thoughts, thought: of where to land next among things, and how many parts of that are done.
         stuck: how often no path was found since the last.
         landings, resumes: how many there were, of the latter in this push. stopped: how many pushes ended because the
-            object or the finger would have left the bounds.
+            object or the finger would have come too near to something.
         failures: how often the finger slipped, or lost the edge too often, at every option. forgiven: whether they were
             forgotten since the last push that came to its end.
         steering: of every option. bounds: of the friction between finger and object. window: see LearningWindow.

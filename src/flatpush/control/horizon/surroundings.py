@@ -9,7 +9,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from ...errors import InputError
-from ...geometry import Outline, rotate, transform
+from ...geometry import Outline, compose, pose_error, rotate, transform
 from ...geometry.collision import Body, World
 from ...geometry.collision.world import WorldArrays
 from ...geometry.pose import Array
@@ -17,7 +17,7 @@ from ...planning.obstacles import Search, obstructions
 from ...planning.options import PushOption
 from ...planning.path import Path
 from ...planning.query import Query
-from ...problem import Scene
+from ...problem import Pusher, Scene
 from ...steering.fleet import Fleet
 from .contact_car import ContactCar
 from .landings import Landing, fleet_of_contacts, free_path
@@ -82,6 +82,24 @@ def crowded(scene: Scene) -> bool:
             hint="Give the angle that the plan ends with.",
         )
     return True
+
+
+def way_over(pusher: Pusher, place: Array, pose: Array, hand: Array) -> Array:
+    """Up, over and down beside a contact, and then onto it: stops of the hand, X_WE and height, shape (4, 4).
+
+    Args:
+        place: X_OE at the contact. pose: X_WO. hand: X_WE now.
+    """
+    contact, before = compose(pose, place), compose(pose, compose(place, [-pusher.approach, 0.0, 0.0]))
+    turn = hand[2] + pose_error(contact, hand)[2]
+    return np.array(
+        [
+            [*hand, pusher.lift],
+            [*before[:2], turn, pusher.lift],
+            [*before[:2], turn, 0.0],
+            [*contact[:2], turn, 0.0],
+        ]
+    )
 
 
 @dataclass(frozen=True, eq=False)

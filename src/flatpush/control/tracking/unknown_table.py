@@ -12,9 +12,10 @@ from ...friction import Support
 from ...geometry import Outline, transform
 from ...geometry.pose import Array
 from ...identification import MotionFit, fit_motion
-from ...problem import Object, Scene, Workspace
+from ...problem import Object, Scene
 from ...simulation.plant import Plant, PlantState
 from ..horizon.controller import HorizonController
+from ..horizon.surroundings import crowded
 from ..loop.closed_loop import ClosedLoopRun, drive
 from ..loop.controller import ARRIVED, ControllerState
 from ..loop.limits import beyond
@@ -61,6 +62,7 @@ def run_unknown(
     """
     if np.isnan(scene.goal_pose[2]):
         raise InputError("an unknown table is learned on the way to a goal with an angle", key="goal")
+    crowded(scene)  # what cannot be done inside bounds is told before the first push
     goal = scene.planning.goal_tolerance
     within = tolerance or (float(min(goal[:2])), float(goal[2]))
     eyes = sensor or SimulatedSensor(camera, np.random.default_rng(seed))
@@ -82,9 +84,8 @@ def run_unknown(
     taught = float(first.times[-1])
     try:
         fit = fit_motion(filmed(states[0]), scene.object, scene.pusher.tip_radius, known_support=False)
-        learned = replace(scene, object=fit.thing, workspace=Workspace())
+        learned = replace(scene, object=fit.thing)
         law = HorizonController.of(learned, rate, camera.latency, True, tolerance=within)
-        law = replace(law, bounds=scene.workspace.bounds)
     except FlatpushError as wrong:
         return UnknownTableRun(
             replace(first, outcome=f"the first pushes do not tell enough: {wrong}"), None, taught
