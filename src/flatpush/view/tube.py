@@ -32,6 +32,7 @@ BANDS = ((0.025, 0.975, 0.22), (0.25, 0.75, 0.42))  # quantiles and opacity
 FEWEST = 5  # runs under way at a sample, for a band there
 ACROSS = 62.0  # height of the panel that shows how wide the tube is [pt]
 TOLERANCE = Look(palette.GOAL, 1.0, (3.0, 2.0))
+PUSH_ENDS = Look(SOFT, 0.6, (2.0, 2.0))
 STUCK, SLIPPED = palette.PUSHES[0], palette.SIMULATED
 FAR_OFF = 4.0  # times the width of 95 % of the ends; a picture of all of them would show only the few
 THIN = 0.02  # width over length below which ends lie on a line, not in an ellipse
@@ -189,7 +190,7 @@ def _width(page: Drawing, frame: Box, tubes: list[Tube]) -> None:
             ring = np.stack([np.concatenate([way, way[::-1]]), np.concatenate([low, high[::-1]])], axis=1)
             panel.area(ring, Look(fill=palette.SIMULATED, fill_opacity=opacity), 5)
         panel.line(np.array([[way[0], 0.0], [way[-1], 0.0]]), Look(palette.SIMULATED, 0.8), 7)
-        panel.line(np.array([[way[-1], -reach], [way[-1], reach]]), Look(SOFT, 0.6, (2.0, 2.0)), 2)
+        panel.line(np.array([[way[-1], -reach], [way[-1], reach]]), PUSH_ENDS, 2)
 
 
 def has_ellipse(runs: Runs) -> bool:
@@ -271,5 +272,6 @@ def _legend(runs: Runs) -> list[Entry]:
     return [
         *entries,
         Entry("goal (×) and its tolerance", TOLERANCE),
+        *([Entry("end of a push", PUSH_ENDS)] if runs.plan.pushes else []),
         *workspace_entries(runs.plan.scene),
     ]
