@@ -207,6 +207,19 @@ def test_a_task_among_things_ends_at_its_goal_and_touches_nothing(number):
 
 
 @pytest.mark.slow
+def test_a_goal_of_any_angle_among_things_is_reached_with_one_that_fits():
+    """The block fits into the slot at the goal only lengthwise; it was refused."""
+    slot = [box(0.0, y, 0.03, 0.005) for y in (-0.031, 0.031)]
+    scene = replace(among(slot), goal=(0.0, 0.0, np.nan))
+    run = run_of(HorizonController.of(scene), scene, 120)
+    assert run.outcome == ARRIVED
+    x, y, turn = run.object[-1]
+    assert np.hypot(x, y) < 0.002
+    assert abs(np.sin(turn)) < np.sin(np.deg2rad(30))
+    assert least_room(scene, run, TIPS) > -1e-4
+
+
+@pytest.mark.slow
 def test_tasks_among_things_end_at_their_goals_and_touch_nothing():
     """`python benchmarks/feedback_among.py` runs more."""
     numbers = [k for k in range(8, 11) if crowded_task(k).steerable]

@@ -9,7 +9,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from ...errors import InputError
-from ...geometry import Outline, compose, pose_error, rotate, transform
+from ...geometry import Outline, compose, pose_error, rotate, transform, wrap_angle
 from ...geometry.collision import Body, World
 from ...geometry.collision.world import WorldArrays
 from ...geometry.pose import Array
@@ -27,6 +27,8 @@ from .push_path import PushPath
 MARGINS = (0.003, 0.002, 0.001, 0.0005)
 # A push stops before it comes nearer than this share of the margin of its path.
 GUARD = 0.4
+# Angles at a goal of any angle that are searched for; on the way downhill they move on from them.
+ANGLES = 12
 # Rounds of the search without a path, and after the first.
 ROUNDS, BETTER = 40, 6
 # Back from the object the finger goes by the first of these shares of the approach that is free.
@@ -64,7 +66,7 @@ def crowded(scene: Scene) -> bool:
     """Whether a scene has bounds or obstacles.
 
     Raises:
-        InputError: if it has, and fingers that are not lifted between pushes, or a goal of any angle.
+        InputError: if it has, and fingers that are not lifted between pushes.
     """
     if scene.workspace.bounds is None and not scene.workspace.obstacles:
         return False
@@ -74,12 +76,6 @@ def crowded(scene: Scene) -> bool:
             key="pusher.transit",
             value=scene.pusher.transit,
             hint="transit: lift, or follow the plan with the path controller.",
-        )
-    if np.isnan(scene.goal_pose[2]):
-        raise InputError(
-            "among bounds and obstacles the horizon controller needs a goal with an angle",
-            key="goal",
-            hint="Give the angle that the plan ends with.",
         )
     return True
 
@@ -151,22 +147,28 @@ class Surroundings:
         """Of the paths from X_WO with the most room to spare the cheapest that is found, as next_push.
 
         Args:
-            fleet: the cars of options. goal: X_WO.
+            fleet: the cars of options. goal: X_WO; its angle is NaN where any will do.
         """
-        pusher = self.scene.pusher
+        pusher, free = self.scene.pusher, bool(np.isnan(goal[2]))
+        angles = wrap_angle(pose[2] + np.arange(ANGLES) * (2 * np.pi / ANGLES)) if free else goal[2:]
+        ends = [np.array([goal[0], goal[1], angle]) for angle in angles]
         places = [option.placement for option in options if option.placement is not None]
         query = Query(
             fleet,
             pose,
-            goal,
+            ends[0],
             self.world,
             [Body.of(self.scene.object.outline, p.tips, pusher.tip_radius) for p in places],
             np.array([transform([0.0, 0.0, p.pose[2]], [-pusher.approach, 0.0]) for p in places]),
+            free=free,
         )
         direct: Path | None = None
         complaint = ""
         for margin in MARGINS:
             asked = replace(query, clearance=self.scene.clearance + margin)
+            able = [end for end in ends if asked.able(end)] if free else ends
+            if able:
+                asked = replace(asked, goal=able[0], other_goals=np.array(able[1:]).reshape(-1, 3))
             if not asked.first or not asked.last:
                 complaint = obstructions(self.scene, asked, options)
                 continue
