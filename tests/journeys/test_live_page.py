@@ -155,6 +155,8 @@ def test_an_obstacle_is_added_blocks_is_moved_and_removed(page):
     assert page.plan["status"] == "solved"
     assert "clearance" in dict(page.plan["proved"])
     page.drag(page.middle("#obstacles .body"), page.middle("#goal .body"))
+    # The last path stays, pale, however many places are refused on the way.
+    assert page.js("return document.querySelectorAll('#plan.stale .flat').length") > 0
     assert "at the goal the object overlaps obstacle 0" in page.text("reason")
     named = "return [...document.querySelectorAll('#table .blamed')].map((node) => node.dataset.item)"
     assert page.js(named) == ["obstacle:0", "goal"]

@@ -3,7 +3,8 @@
 import { RAD, arrow, centroid, corners, find, number, path, radians, set, size } from "./geometry.js";
 
 const MOST = 20000;   /* rows of a recorded run */
-const SOON = 15;      /* between two steps of the finger [ms] */
+const SOON = 12;      /* between two steps of the finger [ms] */
+const READ = 100;     /* between two words about the same mode [ms] */
 
 export class Hand {
   constructor(model, table, connection) {
@@ -49,7 +50,7 @@ export class Hand {
 
   step() {
     const now = performance.now();
-    if (!this.target || this.waiting || !this.connection.open) return;
+    if (!this.target || this.waiting || !this.connection.open || now - this.last < SOON) return;
     const from = this.finger || this.target, still = Math.hypot(from[0] - this.target[0], from[1] - this.target[1]) < 1e-4;
     if (still && this.finger) {   /* it rests: nothing moves */
       if (now - this.last > 250 && !this.resting) { this.resting = true; find("hint").textContent = "at rest"; this.draw(null); }
@@ -76,9 +77,13 @@ export class Hand {
     const middle = centroid(this.model.scene.object.outline), at = this.object;
     const here = [at[0] + Math.cos(at[2]) * middle[0] - Math.sin(at[2]) * middle[1], at[1] + Math.sin(at[2]) * middle[0] + Math.cos(at[2]) * middle[1]];
     this.trail.push(here);
-    if (performance.now() - this.last >= SOON) this.step();   /* drawing took longer than a frame: the plant goes on meanwhile */
+    this.step();   /* if the last one is long ago: the plant goes on while this one is drawn */
     if (this.finger && this.rows.length < MOST) this.rows.push([(performance.now() - this.began) / 1000, this.object, [...this.finger, 0], answer.mode]);
     this.draw(answer);
+    /* Numbers that change in every frame cannot be read. */
+    const said = performance.now();
+    if (answer.mode === this.mode && said - this.said < READ) return;
+    this.mode = answer.mode; this.said = said;
     find("hint").textContent = words(answer);
   }
 

@@ -71,8 +71,8 @@ connection.addEventListener("plan", (event) => {
     const { motion } = plan;
     plan.transits = motion.segments.map((segment, k) => ({ segment, k })).filter(({ segment }) => segment.push === null).map(({ k }) => motion.pusher.filter((_, i) => motion.segment[i] === k));
     model.plan = plan;
-  } else if (plan.status === "refused" && model.plan && model.plan.status === "solved") {
-    model.plan = { ...model.plan, stale: true, status: "refused", places: [] };   /* the last path stays, pale */
+  } else if (plan.status === "refused" && model.plan && model.plan.traces) {
+    model.plan = { ...model.plan, ...plan, stale: true, sketch: false, places: [] };   /* the last path stays, pale */
   } else model.plan = plan;
   if (starting) { starting = false; banner(""); }
   many.clear();

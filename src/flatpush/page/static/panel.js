@@ -19,7 +19,7 @@ const CHOICES = [
   ["cost", "planning.cost", COSTS, ["path of the flat point", "path of the pusher", "time"]],
 ];
 
-const STALE = ["title", "subtitle", "duration", "proved"];   /* that a sketch does not tell */
+const STALE = ["title", "subtitle", "duration", "proved", "strip", "time"];   /* that a sketch does not tell */
 
 const read = (scene, key) => key.split(".").reduce((value, step) => (value === undefined ? undefined : value[step]), scene);
 

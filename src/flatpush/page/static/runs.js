@@ -61,7 +61,7 @@ export class Feedback {
 
   start() {
     const { plan } = this.model;
-    const push = plan && plan.motion && plan.motion.segments.find((segment) => segment.push !== null);
+    const push = plan && plan.status === "solved" && plan.motion && plan.motion.segments.find((segment) => segment.push !== null);
     if (!push) { this.tell("There is no plan with a push to follow.", true); return; }
     this.on = true; this.paused = false; this.waiting = true; this.moved = null;
     this.tips = push.tips;

@@ -302,9 +302,10 @@ export class Table {
     this.model.change((scene) => this.dragged(scene, drag, to, shift, event.shiftKey), drag.gesture, event.timeStamp);
   }
 
-  /* Where the pointer goes is known before the next frame: the plan for it is asked for at once. */
+  /* Where the pointer goes is known before the next frame: what follows from it is asked for at once. */
   soon(event) {
-    const { drag, connection } = this;
+    const { drag, connection, hand } = this;
+    if (hand.on && !drag && !this.sketch) { hand.move(this.at(event)); hand.step(); return; }
     if (!drag || drag.kind !== "item" || !drag.moved || connection.asked) return;
     const to = this.at(event), scene = structuredClone(this.model.scene);
     this.dragged(scene, drag, to, [to[0] - drag.from[0], to[1] - drag.from[1]], event.shiftKey);
