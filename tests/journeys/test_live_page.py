@@ -1,15 +1,19 @@
 """flatpush view as a user meets it: the page in headless Chromium."""
 
+import base64
 import itertools
 import json
 import os
 import signal
 import subprocess
 import time
+from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.extras import extra
+from tests.live_pages import SCENE
 from tests.live_server import PATIENCE, Served
 from tests.waiting import until
 
@@ -204,6 +208,43 @@ def test_a_drawing_is_dropped_and_the_link_brings_it_back(page):
     page.open(link=link)
     assert page.scene == scene
     assert page.text("title").startswith("wedge: ")
+
+
+def test_files_of_other_kinds_are_dropped_and_each_is_undone(page):
+    from PIL import Image
+
+    picture = np.full((120, 160), 255, np.uint8)
+    picture[30:90, 30:130] = 0
+    mask = BytesIO()
+    Image.fromarray(picture).save(mask, "png")
+    disc = (Path(__file__).parents[1] / "data" / "drawings" / "bulge.dxf").read_bytes()
+    scenes = [page.scene]
+    for name, content, wide, high in (
+        ("disc.dxf", disc, 40, 40),
+        ("mask.png", mask.getvalue(), 50, 30),
+        ("scene.yaml", SCENE.encode(), 59, 29),
+    ):
+        page.js(
+            DROP.replace("arguments[1]", "Uint8Array.from(atob(arguments[1]), (c) => c.charCodeAt(0))"),
+            name,
+            base64.b64encode(content).decode(),
+        )
+        if name.endswith(".png"):
+            page.wait("document.getElementById('pixel').open")
+            page.js("document.getElementById('pixelsize').value = 0.5")
+            page.browser.find_element("css selector", "#pixel .main").click()
+        page.wait(f"document.getElementById('banner').textContent.startsWith('{name}: ')")
+        page.settle()
+        scenes.append(page.scene)
+        outline = np.array(page.js("return flatpush.model.scene.object.outline"))
+        assert np.ptp(outline, axis=0) == pytest.approx([wide, high], abs=0.5)
+        assert page.plan["status"] == "solved", page.plan.get("reason")
+    for scene in scenes[-2::-1]:
+        page.click("undo")
+        assert page.scene == scene
+    page.click("redo")
+    page.settle()
+    assert page.scene == scenes[1]
 
 
 def test_space_plays_and_the_arrows_nudge(page):
