@@ -100,7 +100,7 @@ def _lines(
         f" ends scatter {fit.scatter:.1f} times as much as that explains",
         "; ".join([f"support: {fit.pressure.name}", *others]),
         f"centre of friction ({mm[0][0]:.2f} ± {mm[1][0]:.2f} mm, {mm[0][1]:.2f} ± {mm[1][1]:.2f} mm),"
-        f" ρ = {1e6 * s.rho:.0f} ± {1e6 * s.rho_sd:.0f} mm²",
+        f" ρ = {1e6 * s.rho:.1f} ± {1e6 * s.rho_sd:.1f} mm²",
         f"finger: μ {'=' if s.slid else '≥'} {s.friction:.3f} ± {s.friction_sd:.3f}",
     ]
     if len(s.shares):

@@ -71,8 +71,9 @@ def summarise(fit: MotionFit, names: Sequence[str], radii: Sequence[Radius]) -> 
     pushes, ways = np.unique(fit.seen.stretches.push), fit.seen.longest
     if len(pushes) < FEW_PUSHES or ways < SHORT_PUSH:
         untold.append(
-            f"whether the radii are right: {len(pushes)} pushes of up to {1000 * ways:.0f} mm fit at noise level"
-            f" while radii may be far off; take {FEW_PUSHES} or more of {1000 * SHORT_PUSH:.0f} mm or more"
+            f"whether the radii are right: {len(pushes)} pushes with up to {1000 * ways:.0f} mm of way in use"
+            f" fit at noise level while radii may be far off; take {FEW_PUSHES} or more of"
+            f" {1000 * SHORT_PUSH:.0f} mm or more"
         )
     return Summary(
         centre,
