@@ -157,7 +157,7 @@ def test_verify_recomputes_the_tube(plan):
     wider = replace(plan.scene, object=replace(plan.scene.object, uncertainty=known))
     failed = {claim.name: claim for claim in fp.verify(replace(plan, scene=wider)).failed}
     assert "goes straight for" in str(failed["tube"].recomputed)
-    once = pressed(scene_of())
+    once = pressed(plan.scene)
     assert "tube ends at the goal" in [claim.name for claim in fp.verify(once).failed]
 
 
@@ -269,15 +269,15 @@ def test_where_no_plan_is_found_it_is_said_what_is_missing(change, message):
     assert search(message, plan.reason), plan.reason
 
 
-def test_a_start_region_that_reaches_something_is_refused_with_the_place():
+def test_a_start_region_that_reaches_something_is_refused_with_the_place(plan):
     wall = [(0.04, 0.049), (0.09, 0.049), (0.09, 0.06), (0.04, 0.06)]
-    scene = scene_of(start=(0.06, 0.03, 0.0), workspace=fp.Workspace(None, [wall]))
+    scene = replace(plan.scene, start=(0.06, 0.03, 0.0), workspace=fp.Workspace(None, [wall]))
     with pytest.raises(fp.InputError, match=r"start region .* obstacle 0") as refused:
         fp.plan(scene)
     assert refused.value.key == "object.uncertainty.start"
     with pytest.raises(fp.InputError, match="leaves the bounds"):
-        fp.plan(scene_of(start=(0.06, 0.03, 0.0), workspace=fp.Workspace((-0.1, -0.1, 0.086, 0.1))))
-    check_endpoints(replace(scene, object=replace(scene.object, uncertainty=None)))
+        fp.plan(replace(scene, workspace=fp.Workspace((-0.1, -0.1, 0.086, 0.1))))
+    check_endpoints(scene)
 
 
 @pytest.mark.slow

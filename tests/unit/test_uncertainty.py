@@ -223,6 +223,14 @@ def test_a_start_region_is_for_two_fingers_on_straight_sides(outline, fingers, m
     assert "feedback" in refused.value.hint
 
 
+def test_a_start_region_about_an_origin_far_away_is_refused():
+    """It was turned about the outline's centroid instead, once that had become the origin."""
+    scene = changed(start={"position": 1, "angle": 1})
+    scene["object"]["outline"] = [[x + 9000, y] for x, y in SCENE["object"]["outline"]]
+    with pytest.raises(InputError, match="turned about the drawing's origin, and that is 9 m"):
+        parse_scene({**scene, "pushes": "auto"})
+
+
 def test_a_start_region_is_read_in_the_units_of_the_file_and_written_in_si():
     scene = parse_scene(changed(start={"position": 2, "angle": 1.5}))
     region = scene.object.uncertainty.start

@@ -26,7 +26,8 @@ def moved_inside(scene: Scene) -> Scene:
     Start and goal are then poses of the outline's centroid, with the axes of the drawing.
 
     Raises:
-        InputError: if the goal leaves the angle open: the object would turn about an origin far away.
+        InputError: if the goal leaves the angle open, or a start region has one: the object would turn about an origin
+            far away.
     """
     origin = far_origin(scene.object.outline)
     if origin is None:
@@ -39,6 +40,13 @@ def moved_inside(scene: Scene) -> Scene:
             hint="Draw the outline about its origin, or read its file with origin: centroid.",
         )
     obj = scene.object
+    if obj.uncertainty is not None and obj.uncertainty.start is not None and obj.uncertainty.start.angle > 0:
+        raise InputError(
+            f"a start region is turned about the drawing's origin, and that is {np.hypot(*origin):.4g} m from the"
+            " object",
+            key="object.uncertainty.start",
+            hint="Draw the outline about its origin, or read its file with origin: centroid.",
+        )
     support = obj.support_word or obj.support.translated(-origin)
     moved = Object(
         obj.outline.translated(-origin), support, obj.friction, obj.surface, obj.name, obj.uncertainty
