@@ -413,7 +413,9 @@ class _Reader:
 
     def paints(self, paint: Element) -> bool:
         """Whether a gradient or pattern shows anything; its stops or contents may be those of another."""
-        gradient, seen = paint.tag.endswith("Gradient"), set[int]()
+        if paint.tag not in ("linearGradient", "radialGradient", "pattern"):
+            return True
+        gradient, seen = paint.tag != "pattern", set[int]()
         while id(paint) not in seen:
             seen.add(id(paint))
             parts = [child for child in paint.children if child.tag == "stop" or not gradient]
@@ -427,14 +429,18 @@ class _Reader:
     def is_paper(self, element: Element, state: _State) -> bool:
         """Whether a shape is a white rectangle that covers the page."""
         box = view_box(self.root)
-        if element.tag != "rect" or state.style.get("fill", "").replace(" ", "").lower() not in _WHITE:
+        if state.style.get("fill", "").replace(" ", "").lower() not in _WHITE:
             return False
         if box is None:
             box = np.array([0.0, 0.0, *state.viewport])
-        points = np.concatenate(
-            [s.moved(state.matrix).points(np.inf) for s in self.sizes.segments(element, state)[0]]
-        )
-        low, high = points.min(axis=0), points.max(axis=0)
+        parts = self.sizes.segments(element, state)
+        if len(parts) != 1:
+            return False
+        x, y = points = traced([s.moved(state.matrix) for s in parts[0]])(np.inf).T
+        low, high = points.min(axis=1), points.max(axis=1)
+        area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+        if area < 0.98 * np.prod(high - low):
+            return False
         slack = 1e-3 * max(box[2], box[3])
         return bool(np.all(low <= box[:2] + slack) and np.all(high >= box[:2] + box[2:] - slack))
 
