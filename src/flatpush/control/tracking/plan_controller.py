@@ -18,10 +18,10 @@ from ..laws.reference import PathReference
 from ..laws.steering_model import SteeringModel
 from ..learning.belief import SD_COF, SD_RHO, SteeringBelief
 from ..loop.controller import ARRIVED, AbstractController, ControllerState
-from ..loop.frames import hand, mean_pose
+from ..loop.frames import hand
 from ..loop.limits import Limits
 from ..loop.measurement import Command, Measurement
-from .carried import CarriedController
+from .carried import CarriedController, CarriedState, KnownPose, turned
 from .learning_controller import LearningController
 from .touching import TouchingController
 
@@ -36,6 +36,9 @@ RESERVE, BRAKE = 0.5, 0.6
 CRUISE, RAMP = {"even": 0.98, "plan": 0.998}, {"even": 0.9, "plan": 0.99}
 # The share of the speed at which the junctions of arcs are passed.
 SLOW = 0.03
+
+# No camera is better than this [m, rad]: what is known is weighed by it.
+LEAST_NOISE = 1e-7, 1e-6
 
 #: How the outcome of a run begins that ended off its goal.
 BESIDE = "ended beside the goal"
@@ -69,10 +72,16 @@ class Pushing:
 
 @dataclass(frozen=True, eq=False)
 class PlanState(ControllerState):
-    """Of PlanController: which push is next or under way (their number: all are done), and what it does for it."""
+    """Of PlanController.
+
+    Attributes:
+        push: which is next or under way (their number: all are done), and phase: what it does for it.
+        known: where the object lies, from a look, and from the last push where two fingers carried it.
+    """
 
     push: int = 0
     phase: Looking | Travelling | Pushing = Looking(-np.inf)
+    known: KnownPose | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +136,7 @@ class PlanController(AbstractController[PlanState]):
         """
         check_pushes(plan)
         plan.check_motion()
+        sd = max(sd[0], LEAST_NOISE[0]), max(sd[1], LEAST_NOISE[1])
         scene, first = plan.scene, plan.pushes[0]
         limits = Limits.of(scene.pusher, first.fingers, scene.object.outline.size)
         goal = scene.planning.goal_tolerance
@@ -159,7 +169,12 @@ class PlanController(AbstractController[PlanState]):
                 one = PathController(model, path, rate, deceleration=braking, stale=stale)
             if len(segment.fingers) == 2:
                 one = CarriedController(
-                    one, scene.object.outline, segment.fingers, scene.pusher.tip_radius, sd
+                    one,
+                    scene.object.outline,
+                    segment.fingers,
+                    scene.pusher.tip_radius,
+                    scene.object.friction,
+                    sd,
                 )
             elif learn:
                 one = _learning(scene, option, one, sd)
@@ -199,23 +214,26 @@ class PlanController(AbstractController[PlanState]):
             if not enough:
                 note = f"looking at the object: {len(phase.poses)} frames"
                 return replace(state, mode="looking", note=note), self._standing(state)
-            pose = mean_pose(phase.poses)
+            look = KnownPose.of_look(phase.poses, self.noise)
+            state = replace(state, known=look if state.known is None else state.known.seen(look))
             if state.push == len(self.inner):
-                return self._ended(state, pose), self._standing(state)
-            state = self._to_land(state, pose, hand(seen.frame, seen.told, time))
+                return self._ended(state), self._standing(state)
+            state = self._to_land(state, hand(seen.frame, seen.told, time))
             return self._travel(state, time)
         if isinstance(phase, Travelling):
             return self._travel(state, time)
         return self._push(state, phase, time)
 
-    def _ended(self, state: PlanState, pose: Array) -> PlanState:
-        distance, turn = goal_error(self.plan, pose)
+    def _ended(self, state: PlanState) -> PlanState:
+        assert state.known is not None
+        distance, turn = goal_error(self.plan, state.known.pose)
         inside = distance <= self.tolerance[0] and turn <= self.tolerance[1]
         return replace(state, mode="done", note="", outcome=ARRIVED if inside else beside(distance, turn))
 
-    def _to_land(self, state: PlanState, pose: Array, here: Array) -> PlanState:
+    def _to_land(self, state: PlanState, here: Array) -> PlanState:
         """Up, over to before the contact, down, and to the contact."""
-        pusher = self.plan.scene.pusher
+        assert state.known is not None
+        pusher, pose = self.plan.scene.pusher, state.known.pose
         before, contact = (self.landing(state.push, pose, d) for d in (pusher.approach, 0.0))
         # The hand turns the short way.
         before[2] = here[2] + pose_error(before, here)[2]
@@ -238,9 +256,16 @@ class PlanController(AbstractController[PlanState]):
                 stops[0], here, seen.height, seen.last, seen.climb, 1 / self.rate, table
             )
         if phase.pushes:
-            begun = Pushing(self.inner[state.push].start(time))
-            return self._push(replace(state, phase=begun), begun, time)
+            begun = Pushing(self._landed(state, time, float(here[2])))
+            return self._push(replace(state, phase=begun, known=None), begun, time)
         return replace(state, phase=Looking(time)), self._standing(state)
+
+    def _landed(self, state: PlanState, time: float, yaw: float) -> ControllerState:
+        """The push's controller at its start, with the hand at a yaw."""
+        one = self.inner[state.push]
+        if not isinstance(one, CarriedController) or state.known is None:
+            return one.start(time)
+        return one.landed(time, turned(state.known.covariance, -yaw))
 
     def _push(self, state: PlanState, phase: Pushing, time: float) -> tuple[PlanState, Command]:
         frame = state.seen.frame
@@ -260,7 +285,10 @@ class PlanController(AbstractController[PlanState]):
         here = hand(frame, state.seen.told, time)
         back = compose(here, [-self.plan.scene.pusher.approach, 0.0, 0.0])
         away = Travelling((np.array([*back, 0.0]),), False)
-        return self._travel(replace(state, push=state.push + 1, phase=away), time)
+        one, known = self.inner[state.push], None
+        if isinstance(one, CarriedController) and isinstance(below, CarriedState):
+            known = one.known(below, here)
+        return self._travel(replace(state, push=state.push + 1, phase=away, known=known), time)
 
     def _lost(self, push: int, frame: Measurement) -> bool:
         """Whether the hand is nowhere near its place at the contact of a push; going on would push the air."""
