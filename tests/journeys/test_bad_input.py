@@ -402,3 +402,16 @@ def test_a_list_that_no_scene_has_is_refused_before_each_of_its_entries():
     with pytest.raises(InputError, match="at most 100000 entries, not 200000") as failure:
         parse_scene(document)
     assert failure.value.key == "object.outline"
+
+
+@pytest.mark.parametrize("key", ["object.outline", "workspace.obstacles"])
+def test_more_corners_than_can_be_worked_with_are_refused(key):
+    """describe took minutes with 95,000 of them."""
+    corners = [[0.001 * k, 0.001 * k * k] for k in range(11_000)]
+    several, few = (corners * 2, corners) if key == "object.outline" else ([corners, corners], [corners])
+    outer, inner = key.split(".")
+    with pytest.raises(InputError, match="at most 20000 corners, not 22000") as failure:
+        parse_scene({"flatpush": "scene/1", outer: {inner: several}})
+    assert failure.value.key == key
+    with pytest.raises(InputError, match="this key is missing"):
+        parse_scene({"flatpush": "scene/1", outer: {inner: few}})

@@ -23,6 +23,8 @@ from flatpush.documents import (
     scene_schema,
     scene_template,
 )
+from flatpush.documents.number_lists import number_lists
+from flatpush.documents.reading import mapping_of
 from flatpush.documents.refusals import descriptions
 from flatpush.documents.schema import FOLDER
 from flatpush.errors import InputError
@@ -186,6 +188,67 @@ def test_yaml_means_what_it_looks_like(tmp_path: Path) -> None:
         "b": ["on", "no", "1:30", "0x10", "5", "1_000"],
         "c": [True, None, 5.0],
     }
+
+
+@pytest.mark.parametrize("flow", [False, None, True])
+def test_long_lists_of_numbers_in_yaml_are_read_as_json_and_mean_the_same(flow, monkeypatch):
+    """A scene of 95,000 corners took 2.7 s of CPU to refuse, half of it for the events of its numbers."""
+    corners = [[0.5 * k, -3] for k in range(300)]
+    text = yaml.safe_dump(
+        {
+            "object": {"outline": corners, "friction": 0.3},
+            "points": [[-1e-7, k] for k in range(400)],
+            "z": [1, 2],
+        },
+        default_flow_style=flow,
+    )
+    assert [len(found.values(int)) for found in number_lists(text)] == [300, 400]
+    quick = mapping_of(text, "scene.yaml")
+    assert quick == yaml.safe_load(text)
+    monkeypatch.setattr("flatpush.documents.reading.number_lists", lambda text: [])
+    assert mapping_of(text, "scene.yaml") == quick
+
+
+LONG = str([[0.5 * k, -3] for k in range(300)])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"a: '{LONG}'",
+        f"a: |\n  {LONG}\nb: 1",
+        f"a: 1  # {LONG}",
+        f"a: {LONG[:-1]}, .5, +3, 010]",
+        f"a: {LONG[:-1]}, ]",
+        f"a: [{LONG}, word, {LONG}]",
+        f"a:\n- {LONG}\n- {LONG}",
+        f"a:\n- {{b: {LONG}, c: 1}}",
+        "a:\n- 7\n" + "- [1, 2.5]\n" * 300,
+        "a:\n" + "- [1, 2.5]\n" * 300 + "- word\n",
+        "a:\n" + "- - 1\n  - 2.5\n" * 300 + "b: 3\n",
+        "a:\n  b:\n" + "  - - 1\n    - 2.5\n" * 300 + "  - - 1\n    - 2\n    - 3\n",
+        "a:\n" + "- - - 1\n    - 2\n" + "  - - 1\n    - 2.5\n" * 300,
+    ],
+)
+def test_what_only_looks_like_a_long_list_of_numbers_is_read_as_yaml(text, monkeypatch):
+    quick = mapping_of(text)
+    monkeypatch.setattr("flatpush.documents.reading.number_lists", lambda text: [])
+    assert mapping_of(text) == quick
+
+
+def test_what_is_wrong_beside_a_long_list_of_numbers_is_named_with_its_place():
+    for text, words in (
+        (f"a: {LONG}\nb: 1\nb: 2", "b: this key stands twice"),
+        (f"a: {LONG}\nb: [1\nc: 2", "line 3"),
+        (f"a: {LONG}: 3", "line 1, column"),
+        (f"? {LONG}\n: 3", "a key is a word"),
+        (f"a: !!str {LONG}", "tags"),
+        (f"a: {'[' * 70}{LONG}{']' * 70}", "at most 60 levels"),
+        (f"a: [{'1,' * 600}1]", "a: a list has at most 600 entries"),
+    ):
+        with pytest.raises(InputError) as failure:
+            mapping_of(text, longest=600)
+        assert words in str(failure.value)
 
 
 def test_json_and_yaml_are_told_apart(tmp_path: Path) -> None:

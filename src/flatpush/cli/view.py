@@ -28,6 +28,11 @@ def command(
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
 ) -> int:
     """Serve a page on which the scene is moved by hand and the plan follows. Ctrl-C ends it."""
+    from ..documents.reading import check_readable
+
+    for given in (file, scene):
+        if given is not None:
+            check_readable(given)
     from ..page.options import Options
     from ..page.server import Asked, serve
 

@@ -24,6 +24,8 @@ LENGTHS = (
     *("spacing", "tip_radius", "speed", "acceleration", "approach", "lift"),
     *("travel_speed", "travel_acceleration"),
 )
+# Of an outline, and of all obstacles together: with so many describe takes 20 s, with 95,000 minutes.
+MOST_CORNERS = 20_000
 # A pose whose angle is more than two turns was written in degrees.
 TWO_TURNS = {"rad": 4 * np.pi, "deg": 720.0}
 
@@ -52,6 +54,7 @@ def parse_scene(
     (0.04, [0.06, 0.02, 3.141592653589793])
     """
     _check_lengths(document, source, key)
+    _check_corners(document, source, key)
     raw = _checked_version(plain(document, source, key), source, key)
     model = checked(m.SceneModel, raw, source, key)
     if model.object.support == "unknown" and not unknown:
@@ -87,6 +90,30 @@ def _check_lengths(value: object, source: str, key: str) -> None:
     if isinstance(value, Mapping):
         for name, item in value.items():
             _check_lengths(item, source, join(key, str(name)))
+
+
+def _check_corners(document: Mapping[str, object], source: str, key: str) -> None:
+    """Refuses more corners of the outline, or of all obstacles together, than can be worked with."""
+
+    def entries(*forms: object) -> int:
+        return sum(len(form) for form in forms if isinstance(form, list | tuple | np.ndarray))
+
+    thing, world = document.get("object"), document.get("workspace")
+    outline = thing.get("outline") if isinstance(thing, Mapping) else None
+    obstacles = world.get("obstacles") if isinstance(world, Mapping) else None
+    things = obstacles if isinstance(obstacles, list | tuple) else ()
+    for name, corners in (("object.outline", entries(outline)), ("workspace.obstacles", entries(*things))):
+        _refuse_corners(corners, source, join(key, name))
+
+
+def _refuse_corners(count: int, source: str, key: str) -> None:
+    if count > MOST_CORNERS:
+        raise InputError(
+            f"there are at most {MOST_CORNERS} corners, not {count}",
+            source=source,
+            key=key,
+            hint="Leave out those that change the outline by less than it is known.",
+        )
 
 
 def _checked_version(raw: object, source: str, key: str) -> dict[str, Any]:
@@ -175,7 +202,9 @@ def _outline(ctx: Context, form: Any) -> Outline:
     if isinstance(form, m.CirclePart):
         return Outline.circle(form.circle / ctx.per_metre, ctx.lengths(form.centre))
     if isinstance(form, m.ShapeFilePart):
-        return read_drawing(ctx, form).outline
+        drawn = read_drawing(ctx, form).outline
+        _refuse_corners(0 if drawn.is_circle else len(drawn.vertices), "", "")
+        return drawn
     corners = open_polygon(ctx.lengths(form))
     return (
         Outline.polygon(corners) if (smooth := pixels(ctx, corners)) is None else Outline.polygon(smooth[0])
