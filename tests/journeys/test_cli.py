@@ -300,7 +300,7 @@ def test_a_file_that_is_refused_loads_nothing_heavy(tmp_path):
             ("calibrate", "csv", "--scene", "cut.yaml", "-o", "out.json"),
         ]
         for file in (f"missing.{kind}", f"cut.{kind}")
-    ]  # fmt: skip
+    ] + [["view", "missing.yaml"], ["view", "run.csv", "--scene", "missing.yaml"]]  # fmt: skip
     code = (
         "import sys\n"
         "from flatpush.cli import main\n"

@@ -2,8 +2,8 @@
 
 import json
 import re
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 # Shorter ones are left to the parser of YAML: so many characters.
 _LONG = 1000
@@ -28,7 +28,7 @@ class NumberList(NamedTuple):
         """About as many numbers and lists as it holds."""
         return self.text.count(",") + self.text.count("[") + 1
 
-    def values(self, whole: Any) -> Any:
+    def values(self, whole: Callable[[str], int | float]) -> object:
         """As lists and numbers, whole ones read by a function; None where YAML may mean something else."""
         try:
             return json.loads(self.text, parse_int=whole)

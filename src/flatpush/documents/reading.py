@@ -199,9 +199,11 @@ def _read_yaml(text: str, source: str, longest: int) -> Any:
     return _from_events(text, source, longest, in_all, {})
 
 
-def _with_marks(text: str, source: str, in_all: int) -> tuple[str, dict[str, Any], int]:
+def _with_marks(text: str, source: str, in_all: int) -> tuple[str, dict[str, object], int]:
     """The text with a word for each of its long lists of numbers, the lists, and how many entries they have."""
-    parts, lists, done, entries = [], {}, 0, 0
+    parts: list[str] = []
+    lists: dict[str, object] = {}
+    done = entries = 0
     if _MARK not in text:
         for found in number_lists(text):
             entries += found.entries
@@ -222,7 +224,7 @@ def _refuse_many(source: str, in_all: int) -> None:
     raise InputError(rule, source=source, hint="Is it the right file?")
 
 
-def _from_events(text: str, source: str, longest: int, in_all: int, lists: dict[str, Any]) -> Any:
+def _from_events(text: str, source: str, longest: int, in_all: int, lists: dict[str, object]) -> Any:
     """Builds the values from the parser's events, so that nothing in the file can construct anything else.
 
     What stands for a list of `lists` is that list, which is taken from it. It raises yaml.YAMLError if there are any.
