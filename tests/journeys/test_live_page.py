@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 pytest.importorskip("uvicorn", reason=extra("page"))
 pytest.importorskip("starlette", reason=extra("page"))
 
-DESK, TABLET = (1280, 720), (820, 1180)
+DESK, TABLET, PHONE = (1280, 720), (820, 1180), (390, 844)
 COLUMNS = "object,start_id,run_id,t,obj_x_mm,obj_y_mm,obj_theta_rad,pusher_x_mm,pusher_y_mm,pusher_theta_rad,action_id"
 # A file of a name and a text, as a browser hands it over.
 DROP = (
@@ -50,10 +50,13 @@ class Page:
             browser.get_log(log)
         self.open()
 
-    def open(self, size=DESK, touch=False, link=None):
+    def resize(self, size, touch=False):
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": touch}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         self.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": touch})
+
+    def open(self, size=DESK, touch=False, link=None):
+        self.resize(size, touch)
         self.browser.get("about:blank")
         self.browser.get(link or self.server.link)
         self.wait("window.flatpush && flatpush.answered > 0")
@@ -384,27 +387,29 @@ def test_a_finger_on_a_tablet_drags_the_goal(page):
     assert page.scene["goal"] == pytest.approx([before[0], before[1] + 60 * unit, 0], abs=0.05)
 
 
-@pytest.mark.parametrize("size", [DESK, (1000, 700), TABLET])
-def test_nothing_is_cut_off_and_every_control_has_a_name(page, size):
-    page.open(size)
-    wide, high = page.js(
-        "const page = document.documentElement; return [page.scrollWidth, page.scrollHeight];"
-    )
-    assert (wide, high) == size
-    assert page.js("const p = document.getElementById('panel'); return p.scrollWidth <= p.clientWidth;")
-    table = page.browser.find_element("id", "table").rect
-    assert table["width"] * table["height"] > 0.35 * size[0] * size[1]
-    boxes = page.js(
-        "const all = 'header button:not([hidden]), header select, footer button, footer select';"
-        "return [...document.querySelectorAll(all)]"
-        ".map((n) => { const b = n.getBoundingClientRect(); return [n.id, b.left, b.top, b.right, b.bottom]; });"
-    )
-    for name, left, top, right, bottom in boxes:
-        assert left >= 0, name
-        assert right <= size[0], name
-        assert bottom - top >= 24, name
-    for one, other in itertools.combinations(boxes, 2):
-        assert one[3] <= other[1] or other[3] <= one[1] or one[4] <= other[2] or other[4] <= one[2]
+def test_nothing_is_cut_off_and_every_control_has_a_name(page):
+    for size in (DESK, (1000, 700), TABLET, PHONE):
+        page.resize(size)
+        wide, high = page.js(
+            "const page = document.documentElement; return [page.scrollWidth, page.scrollHeight];"
+        )
+        assert (wide, high) == size
+        assert page.js("const p = document.getElementById('panel'); return p.scrollWidth <= p.clientWidth;")
+        table = page.browser.find_element("id", "table").rect
+        assert table["width"] * table["height"] > 0.35 * size[0] * size[1]
+        boxes = page.js(
+            "const all = 'header button:not([hidden]), header select, footer button, footer select';"
+            "return [...document.querySelectorAll(all)].map((n) => {"
+            " const b = n.getBoundingClientRect(); return [n.id, b.left, b.top, b.right, b.bottom]; });"
+        )
+        across = page.js("const t = document.querySelector('.tools'); return t.scrollWidth - t.clientWidth;")
+        for name, left, top, right, bottom in boxes:
+            assert left >= 0, name
+            assert right <= size[0] + across, name  # on a telephone the tools are a strip that is drawn along
+            assert bottom - top >= 24, name
+        assert across == 0 or size == PHONE
+        for one, other in itertools.combinations(boxes, 2):
+            assert one[3] <= other[1] or other[3] <= one[1] or one[4] <= other[2] or other[4] <= one[2]
     tree = page.browser.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
     roles = {"button", "slider", "spinbutton", "combobox", "checkbox"}
     controls = [n for n in tree if not n["ignored"] and n["role"]["value"] in roles]
