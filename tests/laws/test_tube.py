@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 import flatpush as fp
-from flatpush.contact.landing import _turning_distance, carried, landing
+from flatpush.contact.landing import Landing, _turning_distance, carried, landing
 from flatpush.contact.table_set import TableSet
 from flatpush.documents import load_plan
 from flatpush.documents.scene_reader import parse_scene
@@ -21,7 +21,7 @@ from flatpush.problem.mechanics import placement_of, side_of
 from flatpush.simulation import certify
 from flatpush.simulation.clearance import clearance_of, object_distances
 from flatpush.simulation.rollout import roll
-from flatpush.simulation.tube import tube_of
+from flatpush.simulation.tube import check_landing, tube_of
 from flatpush.view.plan_figure import tube_bands
 
 RECTANGLE = [(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)]
@@ -267,6 +267,29 @@ def test_where_no_plan_is_found_it_is_said_what_is_missing(change, message):
     plan = fp.plan(parse_scene(document))
     assert plan.status == "no_plan"
     assert search(message, plan.reason), plan.reason
+
+
+def test_in_a_notch_a_finger_keeps_as_far_from_the_other_sides_as_the_object_may_be_off():
+    """A finger 4.5 mm from the wall of the notch, less its radius of 2.5 mm, and starts off by 1 or 3 mm."""
+    notch = [(-0.016, -0.02), (-0.016, -0.005), (0.016, -0.005), (0.016, -0.02)]
+    notched = [(-0.04, -0.02), *notch, (0.04, -0.02), (0.04, 0.02), (-0.04, 0.02)]
+    thing = fp.Object(notched, fp.Support.points([(-0.03, 0.01), (0.03, 0.01), (0.0, 0.0)]), friction=0.4)
+    push = fp.Push("notch", thing.outline.nearest((0.0, -0.005)), 2, 0.023)
+    scene = fp.Scene(thing, (0.1, 0.0, 0.0), pusher=PUSHER, pushes=(push,))
+    side = side_of(scene, placement_of(scene, push))
+    assert side.beside == pytest.approx(0.002, abs=1e-9)
+    left = Landing(0.001, 0.0, 0.0, 0.001)
+    check_landing(side, left, 0.001)
+    with pytest.raises(
+        fp.InputError, match=r"another side of the object at 2.00 mm, which may be off by 3.00 mm"
+    ):
+        check_landing(side, left, 0.003)
+    square = fp.Object(RECTANGLE, friction=0.4)
+    push = fp.Push("long", square.outline.nearest((0.0, -0.0175)), 2, 0.018)
+    assert (
+        side_of(replace(scene, object=square), placement_of(replace(scene, object=square), push)).beside
+        == np.inf
+    )
 
 
 def test_a_start_region_that_reaches_something_is_refused_with_the_place(plan):

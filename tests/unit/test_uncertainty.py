@@ -221,6 +221,11 @@ def test_a_start_region_is_for_two_fingers_on_straight_sides(outline, fingers, m
         parse_scene(scene)
     assert refused.value.key == "object.uncertainty.start"
     assert "feedback" in refused.value.hint
+    around = {**changed(start={"position": 1}), "pusher": {"fingers": 2, "spacing": 18, "transit": "planar"}}
+    around["object"]["outline"] = SCENE["object"]["outline"]
+    with pytest.raises(InputError, match="go around the object") as refused:
+        parse_scene(around)
+    assert refused.value.key == "pusher.transit"
 
 
 def test_a_start_region_about_an_origin_far_away_is_refused():

@@ -74,6 +74,8 @@ class Side:
         tip: radius of a fingertip [m].
         back: how far the fingers, where they land, are off the outline [m]; reach: and from O's origin, at most [m].
         size: of the outline [m].
+        beside: how far the fingers, from where they land to where they push, are off its other sides; infinite for a
+            convex outline, whose other sides are behind the corners [m].
     """
 
     along: Array
@@ -85,6 +87,7 @@ class Side:
     back: float
     reach: float
     size: float
+    beside: float
 
     def tilt(self, way: Array) -> float:
         """The angle between a way given in O, shape (2,), and the normal [rad]; 0 for no way."""
@@ -105,8 +108,9 @@ class Side:
                 key="object.uncertainty.start",
                 hint="Push at a straight side, or leave the start region out.",
             )
-        room = np.inf
+        room, pushed = np.inf, set[int]()
         for point in (a, b):
+            pushed.add(outline.nearest(point).edge)
             edge = outline.edges[outline.nearest(point).edge]
             room = min(room, *(float(np.hypot(*(point - corner))) for corner in edge))
         places = placement.points @ along
@@ -116,7 +120,22 @@ class Side:
         return cls(
             along, n, -float(n @ a), (float(places[0]), float(places[1])), room, tip, back,
             float(np.max(np.linalg.norm(landed, axis=1))), outline.size,
+            _others(outline, pushed, landed, placement.tips) - tip,
         )  # fmt: skip
+
+
+def _others(outline: Outline, pushed: set[int], landed: Array, tips: Array) -> float:
+    """The distance of the ways of fingertips to the sides that are not pushed [m]; infinite for a convex outline."""
+    ways = np.diff(outline.edges, axis=1)[:, 0]
+    turns = cross(ways, np.roll(ways, -1, axis=0))
+    if np.all(turns >= 0) or np.all(turns <= 0):
+        return np.inf
+    import shapely
+
+    sides = shapely.linestrings([edge for i, edge in enumerate(outline.edges) if i not in pushed])
+    return float(
+        np.min(shapely.distance(sides[:, None], shapely.linestrings(np.stack([landed, tips], axis=1))))
+    )
 
 
 @dataclass(frozen=True)

@@ -392,6 +392,13 @@ class Scene:
                     key="object.uncertainty.start",
                     hint="Push with two fingers, or leave the start region out and use feedback: flatpush track.",
                 )
+            if self.pusher.transit != "lift":
+                raise InputError(
+                    "fingers that go around the object on the table have to know where it is",
+                    key="pusher.transit",
+                    value=self.pusher.transit,
+                    hint="With a start region (object.uncertainty.start), transit: lift.",
+                )
 
     @property
     def start_pose(self) -> Array:

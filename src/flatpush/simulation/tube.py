@@ -79,6 +79,12 @@ def check_landing(side: Side, found: Landing, off: float) -> None:
     Raises:
         InputError: where they do not.
     """
+    if off > side.beside + EXACT:
+        raise InputError(
+            f"a finger passes another side of the object at {1000 * side.beside:.2f} mm, which may be off by"
+            f" {1000 * off:.2f} mm there",
+            hint="A push further from corners that point inwards, or a smaller region, would do.",
+        )
     if off > side.back + EXACT:
         raise InputError(
             f"the fingers land {1000 * side.back:.2f} mm off the object, which may be off by {1000 * off:.2f} mm there",
