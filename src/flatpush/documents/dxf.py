@@ -264,7 +264,10 @@ def _flaw(entity: "DXFEntity") -> str:
     kind, get = entity.dxftype(), entity.dxf.get
     if entity.dxf.is_supported("extrusion"):
         x, y, z = get("extrusion", (0.0, 0.0, 1.0))
-        if np.hypot(x, y) > _TILTED * abs(z):
+        level = (
+            kind == "LINE" and entity.dxf.start.z == entity.dxf.end.z
+        )  # whose ends are not told in that plane
+        if np.hypot(x, y) > _TILTED * abs(z) and not level:
             return "it lies in a tilted plane, and is seen foreshortened"
     if kind in ("ARC", "ELLIPSE"):
         first, last = ("start_angle", "end_angle") if kind == "ARC" else ("start_param", "end_param")

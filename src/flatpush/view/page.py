@@ -178,7 +178,8 @@ def _grid_values(box: Box, axis: int) -> Array:
     """Round values along an axis of the box [mm]; those at its edges have no room for their numbers."""
     extent = max(box[2] - box[0], box[3] - box[1])
     step = next(s for e in range(-3, 9) for s in (10.0**e, 2 * 10.0**e, 5 * 10.0**e) if extent / s <= 9)
-    low, high = box[axis] + (0.05, 0.1)[axis] * extent, box[axis + 2] - 0.02 * extent
+    # On a telephone the row of numbers and the unit at its end take an eighth.
+    low, high = box[axis] + (0.05, 0.1)[axis] * extent, box[axis + 2] - (0.12, 0.02)[axis] * extent
     return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
 
 
