@@ -1,6 +1,7 @@
 """The gate: what a robot would execute is checked, sample by sample; dangerous edits of plans are refused."""
 
 import copy
+import json
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,9 @@ def scene(kind):
     thing = fp.Object(BLOCK, friction=0.4)
     pushes = tuple(fp.Push(f"edge {k}", thing.outline.at(k, 0.5), 1) for k in (0, 1))
     planning = fp.Planning(iterations=1)
-    if kind == "one":
-        return fp.Scene(thing, (0.01, -0.12, 0.3), pushes=pushes[:1], planning=planning)
+    if kind in ("one", "free"):
+        goal = (0.0, 0.0, "free" if kind == "free" else 0.0)
+        return fp.Scene(thing, (0.01, -0.12, 0.3), goal, pushes=pushes[:1], planning=planning)
     two = tuple(fp.Push(push.name, push.at, 2, 0.015) for push in pushes)
     pusher = fp.Pusher(fingers=2, spacing=0.015, transit="planar" if kind == "planar" else "lift")
     workspace = fp.Workspace()
@@ -52,7 +54,7 @@ def two_pushes(asked):
 @pytest.fixture(scope="module")
 def documents():
     plans = {kind: two_pushes(scene(kind)) for kind in ("two", "planar", "walls")} | {
-        kind: fp.plan(scene(kind)) for kind in ("one", "slides")
+        kind: fp.plan(scene(kind)) for kind in ("one", "free", "slides")
     }
     return {kind: plan_document(plan) for kind, plan in plans.items()}
 
@@ -88,11 +90,22 @@ def edited(document, edit):
     return d
 
 
-@pytest.mark.parametrize("kind", ["one", "two", "planar", "walls", "slides"])
+@pytest.mark.parametrize("kind", ["one", "two", "planar", "walls", "slides", "free"])
 def test_an_honest_plan_is_accepted_and_is_for_its_scene(documents, kind):
     plan = parse_plan(documents[kind])
     for report in (fp.verify(plan), fp.verify(plan, scene=scene(kind))):
         assert report.ok, report.failed
+
+
+@pytest.mark.parametrize("kind", ["one", "two", "walls", "slides", "free"])
+def test_a_plan_that_was_written_otherwise_is_the_same(documents, kind):
+    """Another order of keys, another indentation, a sample twice."""
+    text = json.dumps(
+        edited(documents[kind], "[push[k].insert(5, push[k][5]) for k in ('times', 'object', 'pusher')]")
+    )
+    turned = json.loads(text, object_pairs_hook=lambda pairs: dict(reversed(pairs)))
+    report = fp.verify(parse_plan(json.loads(json.dumps(turned, indent=3))), scene=scene(kind))
+    assert report.ok, report.failed
 
 
 @pytest.mark.parametrize("case", EDITS, ids=lambda case: f"{case['plan']}: {case['edit'][:60]}")
@@ -108,6 +121,7 @@ def test_a_dangerous_edit_is_refused(documents, case):
 
 def test_there_are_enough_edits():
     assert len(EDITS) >= 60
+    assert {case["plan"] for case in EDITS} == {"one", "two", "planar", "walls", "slides", "free"}
 
 
 def test_a_scene_that_is_believed_is_compared_with_one_that_is_trusted(documents):
