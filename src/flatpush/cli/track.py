@@ -133,10 +133,13 @@ def command(
         if log.suffix.lower() != ".csv":
             raise InputError("the log of a simulated run ends in .csv", source=str(log))
     given = _unknown(plan) or load_plan(plan)
+    from ..problem import Scene
+
+    if not isinstance(given, Scene) and given.status == "solved":
+        given.check_motion()
     from ..control import ARRIVED, Camera
     from ..control.tracking.plan_controller import BESIDE, goal_error
     from ..control.tracking.simulated_run import TrackedRun
-    from ..problem import Scene
 
     tracked = TrackedRun(
         cast("Law", controller or "path"),
