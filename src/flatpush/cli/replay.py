@@ -33,7 +33,8 @@ def command(
     no_landings: Annotated[
         bool,
         typer.Option(
-            "--no-landings", help="Of the camera use only each run's first pose, nothing around its landings."
+            "--no-landings",
+            help="Use only each run's first pose of what the camera saw, nothing around its landings.",
         ),
     ] = False,
     columns: Annotated[str, typer.Option(metavar="NAMES", help=COLUMNS)] = "",
