@@ -185,7 +185,7 @@ class _Kept(caching.NullCache):
         try:
             name = self._name(sig, data.codegen)
             if not data._asdict()["library"].has_dynamic_globals:
-                kernel_store.save(name, serialize.dumps(data._reduce()))
+                kernel_store.save(name, serialize.dumps(_reduced(data)))
             for environment in data._find_referenced_environments():  # of what was linked into it
                 data.codegen.set_env(environment.env_name, environment)
             kernel_store.release(name)
@@ -199,6 +199,18 @@ class _Kept(caching.NullCache):
         key = hashlib.sha256(repr((versions, *map(_spelled, arguments))).encode())
         key.update(_meaning(self._compiled))
         return f"{self._compiled.__name__}-{type(self._compiled).__name__}-{key.hexdigest()[:32]}"
+
+
+def _reduced(data: Any) -> Any:
+    """What is kept of a compiled kernel.
+
+    Raises:
+        KeyboardInterrupt: if Ctrl-C came while LLVM handed the code over: Python drops what such a callback raises.
+    """
+    try:
+        return data._reduce()
+    except RuntimeError as error:
+        raise KeyboardInterrupt from error
 
 
 def _spelled(kind: Any) -> str:

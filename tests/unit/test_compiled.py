@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import warnings
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -242,6 +243,26 @@ def test_a_kernel_that_does_not_compile_leaves_the_clock_running(own_store):
     with pytest.raises(Exception, match="no_such"):
         variant(callee="def helper(x):\n    return x.no_such + FACTOR\n")(2.0)
     assert not compiling.busy()
+
+
+def test_an_interrupt_that_the_compiler_dropped_is_raised_after_it(own_store, monkeypatch):
+    """Ctrl-C in LLVM's callback left no object code, and a traceback of numba's with status 1."""
+    monkeypatch.setattr(kernel_store, "save", lambda *_: pytest.fail("half a kernel is kept"))
+    nothing = Mock(side_effect=RuntimeError("no compiled object yet"))
+    monkeypatch.setattr("numba.core.codegen.CodeLibrary._get_compiled_object", nothing)
+    with pytest.raises(KeyboardInterrupt):
+        variant()(2.0)
+    assert not compiling.busy()
+    code = (
+        "import sys; from flatpush.cli.app import _show_unraisable; sys.unraisablehook = _show_unraisable\n"
+    )
+    code += "class Dropped:\n    def __del__(self):\n        raise self.error\n"
+    code += (
+        "for kind in (KeyboardInterrupt, ValueError):\n    one = Dropped(); one.error = kind('x'); del one"
+    )
+    told = python("-c", code).stderr
+    assert "ValueError: x" in told
+    assert "KeyboardInterrupt" not in told
 
 
 def test_neither_the_clock_nor_the_controllers_import_numba():

@@ -75,6 +75,7 @@ def _options(
 def main() -> None:
     """Runs a command; an error is one message on standard error, without a traceback."""
     warnings.showwarning = _show_warning
+    sys.unraisablehook = _show_unraisable
     silence = compiling.listen(CompilingNotice(sys.stderr))
     try:
         status = app(standalone_mode=False)
@@ -101,6 +102,12 @@ def main() -> None:
     finally:
         silence()
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _show_unraisable(told: "sys.UnraisableHookArgs") -> None:
+    """Ctrl-C in a callback of the compiler is raised again after it (see flatpush.compiled)."""
+    if told.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(told)
 
 
 def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:  # type: ignore[no-untyped-def]
