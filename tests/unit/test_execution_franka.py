@@ -98,19 +98,27 @@ def test_a_robot_that_freezes_ends_the_run_and_does_not_go_on_afterwards():
         assert np.ptp(moved[-100:], axis=0).max() < 1e-3
 
 
-@pytest.mark.slow
-def test_interrupts_and_ends_of_the_robot_stop_in_every_phase(triangle, tmp_path):
+# The push goes along the table's y, away from the arm.
+ASIDE = (0.4, 0.0, 0.2, -math.pi / 2)
+
+
+def long_push(triangle):
+    """A plan of one push, and the joint angles where an arm at ASIDE begins it."""
     pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
     pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
     plan = fp.plan(fp.Scene(triangle, (-0.01, -0.06, 0.1), pusher=pusher, pushes=pushes))
-    base = (0.4, 0.0, 0.2, -math.pi / 2)
-    joints = replace(ARM, base=base).joints(home_of(plan))
-    with Controller(joints=joints) as controller, robot_at(controller.host, base=base) as robot:
+    return plan, replace(ARM, base=ASIDE).joints(home_of(plan))
+
+
+@pytest.mark.slow
+def test_interrupts_and_ends_of_the_robot_stop_in_every_phase(triangle, tmp_path):
+    plan, joints = long_push(triangle)
+    with Controller(joints=joints) as controller, robot_at(controller.host, base=ASIDE) as robot:
         assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
     for phase in PHASES:
         with (
             Controller(joints=joints) as controller,
-            robot_at(controller.host, base=base, silence=2.0) as robot,
+            robot_at(controller.host, base=ASIDE, silence=2.0) as robot,
         ):
             more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
         assert 0 <= more <= 11, outcome
@@ -135,13 +143,8 @@ def test_the_same_plan_ends_at_the_same_place_on_all_robots(triangle, tmp_path):
     pytest.importorskip("abb_robot_client", reason=extra("abb"))
     from tests.unit.test_execution_egm import Controller as EgmController
 
-    pusher = fp.Pusher(fingers=2, spacing=0.018, speed=0.03)
-    pushes = (fp.Push("long edge", triangle.outline.nearest([0.0, -0.0095]), 2, 0.018),)
-    plan = fp.plan(fp.Scene(triangle, (-0.01, -0.06, 0.1), pusher=pusher, pushes=pushes))
-    # The push goes along the table's y, away from the arm.
-    base = (0.4, 0.0, 0.2, -math.pi / 2)
-    joints = replace(ARM, base=base).joints(home_of(plan))
-    with Controller(joints=joints) as controller, robot_at(controller.host, base=base) as robot:
+    plan, joints = long_push(triangle)
+    with Controller(joints=joints) as controller, robot_at(controller.host, base=ASIDE) as robot:
         ended = run(plan, robot)
     assert ended.outcome == DONE
     off = [cycle.off for cycle in ended.cycles if "push" in cycle.leg]
@@ -160,7 +163,7 @@ def test_the_same_plan_ends_at_the_same_place_on_all_robots(triangle, tmp_path):
             cell.clock.wait(cell.clock.now() + 0.01)
         found["network"] = cell.object
     for name in ("tool", "fr3", "irb120"):
-        with open_robot(f"mujoco://{name}", plan, base) as cell:
+        with open_robot(f"mujoco://{name}", plan, ASIDE) as cell:
             run(plan, cell)
             found[name] = cell.object
     assert np.hypot(*(found["tool"] - plan.scene.start_pose)[:2]) > 0.04
