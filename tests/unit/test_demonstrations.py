@@ -82,7 +82,9 @@ def check(folder):
             assert len(value) == told["shape"][0] if isinstance(value, list) else told["shape"] == [1]
     assert start == info["total_frames"]
     whole = np.array([frames[k]["action"] for k in range(start)])
-    stats = json.loads((folder / "meta" / "stats.json").read_text())["action"]
+    told = json.loads((folder / "meta" / "stats.json").read_text())
+    assert told["next.done"]["mean"] == pytest.approx([len(episodes) / start])
+    stats = told["action"]
     for name, value in (
         ("min", whole.min(0)),
         ("max", whole.max(0)),
@@ -304,17 +306,25 @@ def test_a_replay_notices_another_action_and_another_end():
     assert demonstrations.replays(env.task, [other, whole]) == [False, False]
 
 
-@pytest.mark.slow
-def test_demonstrations_reach_their_goals_also_after_a_knock(tmp_path, monkeypatch):
-    """Read back from the data set alone: scene, seed and knock of each, and its actions lead to the goal once more."""
-    monkeypatch.setattr(demonstrations, "BLOCK", 4)
-    monkeypatch.setattr(demonstrations, "DISTURBED", 1.0)
-    block = demonstrations.demonstrated(SCENE, 2, 0)
+@pytest.fixture(scope="module")
+def knocked(tmp_path_factory):
+    """A data set of a few episodes in which the object is knocked aside."""
+    folder = tmp_path_factory.mktemp("knocked") / "set"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demonstrations, "BLOCK", 4)
+        patch.setattr(demonstrations, "DISTURBED", 1.0)
+        block = demonstrations.demonstrated(SCENE, 2, 0)
     assert len(block.episodes) >= 3
-    lerobot.LeRobotFolder(tmp_path / "set", 2).add(block, 10)
-    _, frames, episodes = check(tmp_path / "set")
+    lerobot.LeRobotFolder(folder, 2).add(block, 10)
+    return folder
+
+
+@pytest.mark.slow
+def test_demonstrations_reach_their_goals_also_after_a_knock(knocked):
+    """Read back from the data set alone: scene, seed and knock of each, and its actions lead to the goal once more."""
+    _, frames, episodes = check(knocked)
     assert any(e["flatpush/disturbed"] >= 0 for e in episodes)
-    told = json.loads((tmp_path / "set" / "meta" / "flatpush" / "scene-00000.json").read_text())
+    told = json.loads((knocked / "meta" / "flatpush" / "scene-00000.json").read_text())
     task = PushTask(parse_scene(told), noise=fp.Noise(0.0, 0.0, 0.1), eyes=Eyes(2e-4, 3e-3))
     env = PushEnv(task)
     for row in episodes:
@@ -325,3 +335,17 @@ def test_demonstrations_reach_their_goals_also_after_a_knock(tmp_path, monkeypat
             *_, ended, _, info = env.step(np.array(frames[index]["action"], np.float32))
         assert ended
         assert info["is_success"]
+
+
+@pytest.mark.slow
+def test_a_judge_of_data_sets_finds_no_failure(knocked):
+    """lerobot-doctor warns of what the set has not: pictures, and no two equal actions in a row."""
+    pytest.importorskip("lerobot_doctor", reason=extra("test-all"))
+    words = [sys.executable, "-m", "lerobot_doctor.cli", "check", "--json", str(knocked)]
+    told = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
+    found = {check["name"]: check["severity"] for check in json.loads(told.stdout)["checks"]}
+    assert len(found) >= 11
+    assert {name for name, severity in found.items() if severity != "PASS"} <= {
+        "Action Quality", "Training Readiness", "Per-Episode Summary"
+    }  # fmt: skip
+    assert "FAIL" not in found.values()

@@ -256,10 +256,13 @@ class LeRobotFolder:
 
 def _values(episode: Episode) -> dict[str, Array]:
     """What statistics are made of, each (n, values)."""
-    step = np.arange(len(episode.actions))[:, None] / FPS
+    count = len(episode.actions)
+    last = (np.arange(count) == count - 1)[:, None].astype(float)
     return {
         "observation.state": np.asarray(episode.states, dtype=float),
         "action": np.asarray(episode.actions, dtype=float),
         "next.reward": np.asarray(episode.rewards, dtype=float)[:, None],
-        "timestamp": step,
+        "next.done": last,
+        "next.success": last,
+        "timestamp": np.arange(count)[:, None] / FPS,
     }
