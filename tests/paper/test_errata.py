@@ -1,17 +1,22 @@
-"""docs/errata.md, rows 2 to 6, 8 and 11 to 15: what is computed holds, and what is printed does not."""
+"""docs/errata.md: what is computed holds, and what is printed does not. Rows 1 and 7 stand with their equations, in
+test_flat_output.py and test_local_model.py."""
 
 import csv
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import flatpush as fp
 from flatpush.contact import PointContact
 from flatpush.control.laws.formulas import AFTER, AxisGains, Bounds, FlatPose, FlatTarget, linearised
 from flatpush.control.laws.gains import Gains
-from flatpush.experiments import fig4
+from flatpush.errors import NoDubinsReduction
+from flatpush.experiments import fig3, fig4
 from flatpush.friction import Ellipsoid
 from flatpush.geometry import rotate
+from flatpush.planning import Planner
 from flatpush.steering import flat_output
 
 HEADING, SPEED, DT = 0.4, 0.02, 1e-6
@@ -88,6 +93,53 @@ def test_row_8_the_cone_stands_on_the_normal_of_the_contact() -> None:
         assert (abs(force[0]) <= MU * force[1]) is not sticks  # as printed
 
 
+def test_row_9_a_straight_force_outside_the_cone_makes_no_car() -> None:
+    """Of the printed car, with its axle at (c_l + c_r)/2 and |c_l - c_r|/2 as its radius, no motion sticks."""
+    for tilt, sticks in ((0.2, True), (np.arctan(MU) + 0.1, False)):
+        contact = PointContact([0.0, -R], rotate(tilt, [0.0, 1.0]), MU)
+        V_l, V_r = (MATRIX.twist(contact.wrench(f)) for f in contact.force_edges())
+        c_l, c_r = -V_l[1] / V_l[2], -V_r[1] / V_r[2]
+        axle, radius = 0.5 * (c_l + c_r), 0.5 * abs(c_l - c_r)
+        for omega in np.array([-0.95, -0.4, 0.0, 0.4, 0.95]) / radius:  # forward at a speed of 1
+            V = np.array([omega * A / B / R, 1 - omega * axle, omega])
+            u = np.array([V[0] + V[2] * R, V[1]])  # of the contact
+            assert (contact.motion(MATRIX, u).mode == "sticking") is sticks
+        if sticks:
+            assert flat_output(contact, MATRIX).min_radius == pytest.approx(radius)
+            continue
+        assert V_l[2] * V_r[2] > 0  # every force turns it the same way
+        with pytest.raises(NoDubinsReduction) as refusal:
+            flat_output(contact, MATRIX)
+        assert refusal.value.degrees == pytest.approx(np.rad2deg(0.1))
+
+
+# Start of a square that the shortest word of the flat point (RLR) takes longer to bring to its goal than RSR does.
+ROW_10 = (0.06, -0.06, float(np.deg2rad(-80)))
+
+
+def flat_length(plan: fp.Plan) -> float:
+    """Of the way of the flat point [m], from the plan's arcs."""
+    car = Planner(plan.scene).usable[0].car
+    x, y = 0.5 * (car.left_centre + car.right_centre)
+    V = np.array([arc.twist for push in plan.pushes for arc in push.arcs])
+    durations = np.array([arc.duration for push in plan.pushes for arc in push.arcs])
+    return float(durations @ np.hypot(V[:, 0] - V[:, 2] * y, V[:, 1] + V[:, 2] * x))
+
+
+def test_row_10_the_shortest_path_of_the_flat_point_is_not_the_fastest_push() -> None:
+    """A fingertip goes √(1 + (L/R)²) times as far as the flat point in a turn, L = r + ρ/r, and has a speed."""
+    given = replace(fig3.scenes()[0], start=ROW_10)
+    shortest, fastest = (
+        fp.plan(replace(given, planning=replace(given.planning, cost=cost))) for cost in ("flat", "time")
+    )
+    assert fp.verify(shortest).ok
+    assert fp.verify(fastest).ok
+    assert shortest.cost == pytest.approx(flat_length(shortest), rel=1e-6)
+    assert flat_length(fastest) > 1.02 * shortest.cost
+    assert (shortest.pushes[0].word, fastest.pushes[0].word) == ("RLR", "RSR")
+    assert fastest.duration < 0.95 * shortest.duration
+
+
 def test_row_11_the_law_is_not_linear_at_rest_nor_outside_the_cone() -> None:
     gains = AxisGains(4.0, 4.0, 4.0, 4.0)
     ahead = rotate(HEADING, [0.0, 1e-4])
@@ -159,6 +211,23 @@ def test_row_15_a_contact_with_c_needs_the_flat_speed_as_the_compensator_s_state
 
     assert speed((s - c * omega) / a) == pytest.approx(s, rel=1e-12)
     assert abs(speed(s / a) - s) > 0.05 * s  # Eqs. 43-45 as they stand, ζ = s/a
+
+
+def test_row_16_only_the_ratio_of_a_and_b_moves_anything() -> None:
+    f, u = np.array([0.3, 1.0]), np.array([0.002, 0.02])
+    F, steps = BELOW.wrench(f), 1e-3 * np.diag([1.0, 1.0, R])
+    gradient = (MATRIX.value(F + steps) - MATRIX.value(F - steps)) / (2 * np.diag(steps))
+    np.testing.assert_allclose(gradient[:2], 2 * A * f, rtol=1e-9)  # Eq. 1, with k = 1, of H = FᵀAF
+    np.testing.assert_allclose(MATRIX.twist(F)[:2], A * f)  # Eqs. 4 and 5
+    J = np.array([[1.0, 0.0, R], [0.0, 1.0, 0.0]])
+    force = np.linalg.solve(J @ MATRIX.matrix @ J.T, u)  # Eq. 13
+    for scale in (0.5, 1e3):
+        scaled = Ellipsoid(scale * MATRIX.matrix)
+        np.testing.assert_allclose(np.linalg.solve(J @ scaled.matrix @ J.T, u), force / scale)
+        assert flat_output(BELOW, scaled).min_radius == pytest.approx(flat_output(BELOW, MATRIX).min_radius)
+        motion = BELOW.motion(scaled, u)
+        assert motion.mode == "sticking"
+        np.testing.assert_allclose(motion.twist, BELOW.motion(MATRIX, u).twist, rtol=1e-12)
 
 
 def test_every_row_that_is_cited_is_there() -> None:

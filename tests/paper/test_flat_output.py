@@ -162,11 +162,9 @@ def test_recover_on_the_papers_matrix_is_the_papers_equations():
     pose, force = flat.recover(z, dz, ddz)
     v, turn = np.hypot(*dz), dz[0] * ddz[1] - ddz[0] * dz[1]
     theta = np.arctan2(-dz[0], dz[1])  # Eq. 31, errata row 6
-    q = (
-        z - np.array([[dz[1], dz[0]], [-dz[0], dz[1]]]) @ [c, rho / r] / v
-    )  # Eq. 32, sign of its corner as Eq. 25
+    q = z - np.array([[dz[1], dz[0]], [-dz[0], dz[1]]]) @ [c, rho / r] / v  # Eq. 32
     np.testing.assert_allclose(pose, [*(z - rotate(theta, [c, rho / r])), theta], rtol=1e-12)
-    np.testing.assert_allclose(q[1], pose[1], rtol=1e-12)
+    np.testing.assert_allclose(q, pose[:2], rtol=1e-12)
     np.testing.assert_allclose(
         force, [turn / (b * r * v**2), (v**3 - c * turn) / (a * v**2)], rtol=1e-12
     )  # Eq. 33
