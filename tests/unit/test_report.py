@@ -1,19 +1,29 @@
 """The whole paper as one page: its sections, their order, and what a missing extra or folder makes of them."""
 
+import os
 import re
+import signal
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from html import unescape
 
 import numpy as np
 import pytest
+from tests.command_line import flatpush
 from tests.extras import extra
+from tests.waiting import started
 
 from flatpush.cli import main
 from flatpush.contact import PointContact
 from flatpush.experiments import EXPERIMENTS, duality, experiment
-from flatpush.experiments.everything import SECTIONS, Done, Job, compute, everything
+from flatpush.experiments.everything import _FIND as FINDS
+from flatpush.experiments.everything import SECTIONS, Done, Job, compute, everything, in_processes
 from flatpush.experiments.finding import Finding, Row
 from flatpush.experiments.report import page
 from flatpush.friction import Ellipsoid
+
+HOME = "flatpush.experiments.everything"
 
 
 def found(job: Job) -> Done:
@@ -34,7 +44,7 @@ def backwards(function, jobs, told):
 
 
 def test_sections_stand_in_their_order_wherever_they_were_computed(monkeypatch):
-    monkeypatch.setattr("flatpush.experiments.everything.compute", found)
+    monkeypatch.setattr(f"{HOME}.compute", found)
     told = []
     sections = everything(True, None, backwards, told.append)
     assert [done.job.name for _, done in sections] == [section.name for section in SECTIONS]
@@ -51,6 +61,48 @@ def test_sections_stand_in_their_order_wherever_they_were_computed(monkeypatch):
         *(f"#{s.name}"[:4] for s in SECTIONS),
     }
     assert text.count("data:image/svg+xml;base64,PHN2Zy8+") == len(SECTIONS)
+
+
+def test_an_experiment_that_fails_leaves_the_report_of_the_others(monkeypatch, tmp_path):
+    def fails(quick, data):
+        raise ZeroDivisionError("a mistake")
+
+    monkeypatch.setitem(FINDS, "fig3", fails)
+    monkeypatch.setattr(f"{HOME}.in_processes", lambda count: backwards)
+    monkeypatch.setattr(f"{HOME}.compute", lambda job: compute(job) if job.name == "fig3" else found(job))
+    ended = flatpush("experiment", "all", "-o", tmp_path / "report")
+    assert ended.returncode == 1
+    assert "fig3 (failed: ZeroDivisionError: a mistake)" in ended.stderr
+    text = (tmp_path / "report" / "index.html").read_text("utf-8")
+    assert "This experiment failed: ZeroDivisionError: a mistake" in text
+    assert 'raise ZeroDivisionError("a mistake")' in unescape(text)  # where, for whoever mends it
+    assert text.count("2 &amp; 3") == len(SECTIONS) - 1
+
+
+def test_a_process_that_dies_ends_its_own_experiment():
+    told = []
+    (done,) = in_processes(1)(os._exit, [3], told.append)
+    assert told == [done]
+    assert "terminated abruptly" in done.finding.failed
+
+
+INTERRUPTED = """
+import signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from flatpush.experiments.everything import in_processes
+in_processes(2)(time.sleep, [0, 60, 60], lambda done: print("begun", flush=True))
+"""
+
+
+def test_ctrl_c_ends_all_processes_at_once():
+    with started(
+        [sys.executable, "-c", INTERRUPTED], 60, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as it:
+        assert it.stdout.readline() == "begun\n"
+        os.killpg(it.pid, signal.SIGINT)  # as a terminal does
+        _, said = it.communicate(timeout=50)  # of the 60 s that the processes would have slept
+    assert said.rstrip().endswith("KeyboardInterrupt")
+    assert "Process Spawn" not in said
 
 
 def test_every_section_is_an_experiment_of_its_own():

@@ -103,7 +103,14 @@ def test_a_case_ends_at_the_goal_and_is_drawn(tmp_path):
     assert np.all(np.abs(case.errors[:, 2]) < np.radians(0.3))
     assert not np.allclose(case.starts[0], case.starts[1])
     draw("fig7", [case], tmp_path / "fig7.svg")
-    assert "start 20, -30, 90" in (tmp_path / "fig7.svg").read_text()
+    drawn = (tmp_path / "fig7.svg").read_text()
+    assert "start 20, -30, 90" in drawn
+    assert f"push {len(case.pushes)} begins" in drawn
+    assert f"push {len(case.pushes) + 1} begins" not in drawn
+    for way, start, end in zip(case.ways, case.starts, case.ends, strict=True):
+        assert len(way) == len(case.pushes)
+        np.testing.assert_allclose(way[0][0], start, atol=1e-4)
+        np.testing.assert_allclose(way[-1][-1], end, atol=1e-4)
 
 
 @pytest.mark.slow

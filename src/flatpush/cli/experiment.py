@@ -121,7 +121,11 @@ def _all(
     def told(one: Done) -> None:
         nonlocal done
         done += 1
-        word = "left out: " + one.finding.missing if one.finding.missing else f"{one.cpu:.0f} s of CPU"
+        word = f"{one.cpu:.0f} s of CPU"
+        if one.finding.missing or one.finding.failed:
+            word = (
+                f"left out: {one.finding.missing}" if one.finding.missing else f"failed: {one.finding.failed}"
+            )
         typer.echo(f"{done} of {len(SECTIONS)}: {one.job.name} ({word})", err=True)
 
     if on_cluster or scheduler is not None:
@@ -139,13 +143,14 @@ def _all(
                 section.name: {
                     "rows": [asdict(row) for row in one.finding.rows],
                     "missing": one.finding.missing or None,
+                    "failed": one.finding.failed or None,
                 }
                 for section, one in found
             }
         )
     else:
         typer.echo(f"wrote {output / REPORT}" if output is not None else "")
-    return 0
+    return 1 if any(one.finding.failed for _, one in found) else 0
 
 
 def _machine() -> str:

@@ -4,13 +4,15 @@ A job is a name and what it may read; its finding holds all that the report show
 process or machine, in any order.
 """
 
+import signal
 import time
+import traceback
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Protocol
 
@@ -133,7 +135,7 @@ def everything(
 
 
 def compute(job: Job) -> Done:
-    """One section; what an extra or a folder is missing for says so instead of ending everything."""
+    """One section; what an extra or a folder is missing for, or a mistake, is told instead of ending everything."""
     began = time.process_time()
     find = _FIND.get(job.name)
     if find is None:
@@ -142,26 +144,46 @@ def compute(job: Job) -> Done:
         found = find(quick=job.quick, data=Path(job.data) if job.data else None)
     except FlatpushError as error:
         found = Finding(missing=str(error))
+    except Exception as error:
+        found = Finding(failed=f"{type(error).__name__}: {error}", table=traceback.format_exc())
     return Done(job, found, time.process_time() - began)
 
 
 def in_processes(count: int) -> Spread:
-    """Jobs in so many processes of this machine."""
+    """Jobs in so many processes of this machine, which end with this one's interest in them."""
 
     def spread(
         function: Callable[[Job], Done], jobs: Sequence[Job], told: Callable[[Done], None]
     ) -> list[Done]:
-        with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-            futures = [pool.submit(function, job) for job in jobs]
-            for future in futures:
-                future.add_done_callback(lambda done: None if done.exception() else told(done.result()))
+        others = set(active_children())
+        # Ctrl-C reaches every process of a terminal; this one answers for all.
+        with ProcessPoolExecutor(
+            count, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
+        ) as pool:
             try:
-                return [future.result() for future in futures]
+                futures = {pool.submit(function, job): job for job in jobs}
+                done = {}
+                for future in as_completed(futures):
+                    done[futures[future]] = one = _ended(future, futures[future])
+                    told(one)
+                return [done[job] for job in jobs]
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
+                for process in set(active_children()) - others:
+                    process.terminate()
                 raise
 
     return spread
+
+
+def _ended(future: "Future[Done]", job: Job) -> Done:
+    """What a process made of a job, also if it did not live to tell."""
+    error = future.exception()
+    return (
+        future.result()
+        if error is None
+        else Done(job, Finding(failed=f"its process ended: {error or type(error).__name__}"), 0.0)
+    )
 
 
 def _fig3(quick: bool, data: Path | None) -> Finding:

@@ -35,13 +35,15 @@ class Finding:
         rows: beside the paper's.
         figures: names of files and their SVG, in order.
         table: what the experiment prints by itself.
-        missing: why there is no result, "" if there is one.
+        missing: what there is no result without, "" if there is one.
+        failed: the mistake that ended it, "" if none did.
     """
 
     rows: tuple[Row, ...] = ()
     figures: tuple[tuple[str, str], ...] = ()
     table: str = ""
     missing: str = ""
+    failed: str = ""
 
     def text(self) -> str:
         """The rows as they are printed, the paper's and ours under each other."""

@@ -62,7 +62,8 @@ def page(sections: Sequence[tuple[Section, Done]], machine: str, quick: bool) ->
 
 def _section(section: Section, done: Done) -> str:
     found = done.finding
-    inside = f'<p class="missing">{escape(found.missing)}</p>' if found.missing else _content(found)
+    told = found.missing or (found.failed and f"This experiment failed: {found.failed}")
+    inside = (f'<p class="missing">{escape(told)}</p>' if told else "") + _content(found)
     return (
         f'<section id="{section.name}"><h2>{escape(section.title)}</h2>'
         f'<p class="about">{escape(section.about)}</p>{inside}</section>'

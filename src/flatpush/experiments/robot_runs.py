@@ -14,6 +14,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import groupby
 from pathlib import Path
 from time import process_time
 
@@ -25,9 +26,9 @@ from ..errors import InputError
 from ..execution import DONE
 from ..execution import run as run_on
 from ..execution.cell.robot import CellRobot
-from ..execution.run import slowed
+from ..execution.run import Run, slowed
 from ..execution.simulated import Unknown
-from ..geometry import pose_error
+from ..geometry import pose_error, transform
 from ..geometry.pose import Array
 from ..planning import plan
 from ..planning.options import push_option
@@ -81,7 +82,8 @@ PRINTED: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {
     ),
 }
 SWITCH = {"fig6": 0.03, "fig7": 0.03, "fig8": 0.05, "fig9": 0.01}
-COLOURS = ("#cc3311", "#882255", "#4477aa")  # the starts, as in the paper: red, purple, blue
+COLOURS = ("#cc3311", "#882255", "#4477aa")  # of pushes in sequence, as in the paper: red, purple, blue
+POINTS = 40  # of the object's way in a push
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,7 @@ class Case:
     Attributes:
         plans: what they run, one after the other. starts, ends: X_WO, shape (n, 3). outcomes: of each run.
         seconds: of simulated time, and cpu: of the machine, for all runs [s].
+        ways: X_WO in each push of each run, arrays of shape (m, 3).
     """
 
     plans: tuple[Plan, Plan]
@@ -99,6 +102,7 @@ class Case:
     outcomes: tuple[str, ...]
     seconds: float
     cpu: float
+    ways: tuple[tuple[Array, ...], ...] = ()
 
     @property
     def errors(self) -> Array:
@@ -181,15 +185,28 @@ def cases(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[Case]:
     """The runs of a figure, one case for each start."""
     for number, start in enumerate(STARTS[figure]):
         both = plans(figure, start)
-        starts, ends, outcomes, seconds, begun = [], [], [], 0.0, process_time()
+        starts, ends, ways, outcomes, seconds, begun = [], [], [], [], 0.0, process_time()
         for k in range(runs):
             with CellRobot(both[0], beside(figure, number, k, seed)) as robot:
                 starts.append(robot.object)
                 done = [run_on(one, robot) for one in both]
                 ends.append(robot.object)
+                ways.append(way_of(done))
                 outcomes.append(next((one.outcome for one in done if one.outcome != DONE), DONE))
                 seconds += robot.clock.now()
-        yield Case(both, np.array(starts), np.array(ends), tuple(outcomes), seconds, process_time() - begun)
+        cpu = process_time() - begun
+        yield Case(both, np.array(starts), np.array(ends), tuple(outcomes), seconds, cpu, tuple(ways))
+
+
+def way_of(done: Sequence[Run]) -> tuple[Array, ...]:
+    """X_WO in each push of plans that were run one after the other, each of some POINTS rows."""
+    found = []
+    for one in done:
+        for leg, cycles in groupby(one.cycles, key=lambda cycle: cycle.leg):
+            poses = [cycle.object for cycle in cycles if cycle.object is not None]
+            if "(push " in leg and poses:
+                found.append(np.array([*poses[:: 1 + len(poses) // POINTS], poses[-1]]))
+    return tuple(found)
 
 
 def beside(figure: str, number: int, k: int, seed: int) -> Unknown:
@@ -320,8 +337,8 @@ def half_widths(values: Array) -> Array:
 
 
 def draw(figure: str, found: list[Case], path: Path) -> None:
-    """Initial poses in the colours of the paper and final ones in black."""
-    from ..view.drawing import INK, PAGE, Drawing, Look
+    """As the paper draws them: for each start a panel, the object when each push begins, and its end in black."""
+    from ..view.drawing import INK, PAGE, SOFT, Drawing, Look, Text, shortened
     from ..view.legend import EDGE, Entry, draw_legend, draw_title, legend_height, title_height
     from ..view.panel import BOTTOM, LEFT, Panel
     from ..view.picture import check_ending, save_picture
@@ -330,28 +347,47 @@ def draw(figure: str, found: list[Case], path: Path) -> None:
     check_ending(path)
     scene = found[0].plans[0].scene
     title = f"{scene.object.name}: {sum(len(case.ends) for case in found)} open-loop runs of two fingers ({figure})"
-    corners = np.concatenate(
-        [MM * outline_at(scene, pose) for case in found for pose in (*case.starts, *case.ends)]
+    subtitle = (
+        "the object at the beginning of each push and at the end; lines: the way of its centre of friction"
     )
-    low, high = corners.min(axis=0) - 5, corners.max(axis=0) + 5
+    most = max(len(way) for case in found for way in case.ways)
     entries = [
-        *(
-            Entry(f"start {', '.join(f'{v:g}' for v in start)}", Look(colour, 1.2))
-            for start, colour, _ in zip(STARTS[figure], COLOURS, found, strict=False)
-        ),
-        Entry("final", Look(INK, 1.0)),
+        Entry(
+            f"push {k + 1} begins",
+            Look(COLOURS[k % len(COLOURS)], 0.8, fill=COLOURS[k % len(COLOURS)]),
+            "box",
+        )
+        for k in range(most)
     ]
-    top, wide = title_height(title, "") + 6, PAGE - 2 * EDGE - LEFT
-    height = float(np.clip(wide * (high[1] - low[1]) / (high[0] - low[0]), 180.0, 360.0))
-    below = top + height + BOTTOM
+    entries.append(Entry("end", Look(INK, 0.8, fill=INK), "box"))
+    corners = [
+        MM
+        * np.concatenate(
+            [outline_at(scene, pose) for way in case.ways for part in way for pose in part[[0, -1]]]
+        )
+        for case in found
+    ]
+    middles = [(points.min(axis=0) + points.max(axis=0)) / 2 for points in corners]
+    half = np.max([np.ptp(points, axis=0) for points in corners], axis=0) / 2 + 4
+    top, above, gap = title_height(title, subtitle), 24.0, 8.0
+    width = (PAGE - 2 * EDGE - LEFT + gap) / len(found) - gap
+    height = width * float(half[1] / half[0])
+    below = top + above + height + BOTTOM
     page = Drawing(PAGE, below + legend_height(entries, PAGE - 2 * EDGE) + EDGE, title)
-    draw_title(page, title, "")
-    frame = (EDGE + LEFT, top, PAGE - EDGE, top + height)
-    panel = Panel(page, frame, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
-    panel.axes()
-    for case, colour in zip(found, COLOURS, strict=False):
-        for begin, end in zip(case.starts, case.ends, strict=True):
-            draw_object(panel, scene, begin, Look(colour, 0.8), 4)
-            draw_object(panel, scene, end, Look(INK, 0.6), 5)
+    draw_title(page, title, subtitle)
     draw_legend(page, entries, EDGE, below, PAGE - 2 * EDGE)
+    for k, (start, case, middle) in enumerate(zip(STARTS[figure], found, middles, strict=False)):
+        left, high = EDGE + LEFT + k * (width + gap), top + above
+        box = (*(middle - half).tolist(), *(middle + half).tolist())
+        panel = Panel(page, (left, high, left + width, high + height), box)
+        panel.axes("x [mm]", "y [mm]" if k == 0 else "")
+        name = f"start {', '.join(f'{v:g}' for v in start)}°: {len(case.ends)} runs"
+        page.add(Text(left, high - 13, name, 7.5, INK, bold=True), 20)
+        page.add(Text(left, high - 4, shortened(" – ".join(case.pushes), 7.0, width), 7.0, SOFT), 20)
+        for way in case.ways:
+            for number, part in enumerate(way):
+                colour = COLOURS[number % len(COLOURS)]
+                draw_object(panel, scene, part[0], Look(colour, 0.8, fill=colour, fill_opacity=0.12), 4)
+                panel.line(MM * transform(part, scene.object.cof), Look(colour, 0.8), 6)
+            draw_object(panel, scene, way[-1][-1], Look(INK, 0.6, fill=INK, fill_opacity=0.25), 5)
     save_picture(page, path)
