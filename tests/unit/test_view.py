@@ -1,7 +1,6 @@
 """The picture of a plan: what stands where."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from flatpush.view.panel import Panel, frame_for
 from flatpush.view.plan_figure import cone_length, draw_plan
 from flatpush.view.timeline import Timeline, doing
 from flatpush.view.trace import fingertips, rollout_paths, trace_pushes
-from flatpush.view.words import STRIP, plan_title, travel
+from flatpush.view.words import STRIP, plan_title
 
 
 def test_the_flat_path_is_smooth_and_as_long_as_the_flat_cost():
@@ -201,19 +200,7 @@ def test_axes_show_what_they_must_without_wide_margins(size):
 
 def test_the_title_says_what_happens():
     plan = make_plan(pushes=9)
-    line = transform(np.concatenate([push.object for push in plan.pushes]), plan.scene.object.cof)
-    way = np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1))
-    assert plan_title(plan) == f"triangle: 9 pushes, {way:.2f} m, {plan.duration:.0f} s"
-    assert travel(plan) == pytest.approx(way, rel=1e-3)  # chords of a sampled path
-    # The same pushes of an object whose drawing has its origin elsewhere.
-    aside = replace(
-        plan.scene.object, outline=Outline.polygon(TRIANGLE + np.array([0.05, 0.02])), support="uniform"
-    )
-    moved = replace(plan, scene=replace(plan.scene, object=aside, pushes="auto"))
-    line = transform(np.concatenate([push.object for push in plan.pushes]), aside.cof)
-    way_aside = np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1))
-    assert travel(moved) == pytest.approx(way_aside, rel=1e-3)
-    assert abs(way_aside - way) > 0.01 * way  # far more than the tolerance
+    assert plan_title(plan) == f"triangle: 9 pushes, {plan.duration:.0f} s"
 
 
 def test_cones_stay_inside_the_object():

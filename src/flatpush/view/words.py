@@ -1,8 +1,5 @@
 """How figures and pages put a plan into words: its title, its cost, its pushes, what goes on."""
 
-import numpy as np
-
-from ..geometry import transform
 from ..problem import Plan, PushSegment, Scene, TableSegment
 
 START, GOAL, BOTH = "start", "goal", "start = goal"
@@ -22,7 +19,7 @@ BOUNDS, OBSTACLE, TREE, SIMULATED = "bounds", "obstacle", "search tree", "simula
 
 
 def plan_title(plan: Plan) -> str:
-    """What happens: the object, how many pushes, how far it goes, and how long that takes."""
+    """What happens: the object, how many pushes, and how long that takes; how far it goes is the cost's to say."""
     name = plan.scene.object.name
     if plan.status != "solved":
         return f"{name}: no plan"
@@ -30,7 +27,7 @@ def plan_title(plan: Plan) -> str:
     if not pushes:
         return f"{name}: nothing to push"
     count = "one push" if len(pushes) == 1 else f"{len(pushes)} pushes"
-    return f"{name}: {count}, {length_text(travel(plan))}, {plan.duration:.0f} s"
+    return f"{name}: {count}, {plan.duration:.0f} s"
 
 
 def plan_subtitle(plan: Plan) -> str:
@@ -56,25 +53,6 @@ def cost_words(scene: Scene, cost: float) -> str:
     of = {"flat": FLAT_PATH, "pusher": "path of the pusher", "time": "time"}[scene.planning.cost]
     number = f"{cost:.1f} s" if scene.planning.cost == "time" else f"{1e3 * cost:.1f} mm"
     return f"{number} ({of})"
-
-
-def travel(plan: Plan) -> float:
-    """How far the centre of friction goes [m], arc by arc: |v + ω × p| is constant along an arc; slides by samples."""
-    x, y = plan.scene.object.cof
-    total = 0.0
-    for push in plan.pushes:
-        for arc in push.arcs:
-            vx, vy, w = (float(v) for v in arc.twist)
-            total += arc.duration * float(np.hypot(vx - w * y, vy + w * x))
-    for slide in plan.slides:
-        way = transform(slide.object, plan.scene.object.cof)
-        total += float(np.sum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
-    return total
-
-
-def length_text(length: float) -> str:
-    """A length [m] in words: metres from 1 m up, else millimetres."""
-    return f"{length:.2f} m" if length >= 1 else f"{1e3 * length:.0f} mm"
 
 
 def word_of(push: TableSegment) -> str:
