@@ -1,5 +1,7 @@
 """Blocks of made-up episodes, which take no time: what writes data sets is tried with them."""
 
+import time
+
 import numpy as np
 
 from flatpush.gym.demonstrations import Block, Episode
@@ -18,3 +20,10 @@ def quick(scene: Scene, seed: int, number: int) -> Block:
             Episode(own, number, states[:n], actions, rng.normal(size=n), -1, np.zeros(3), states[n])
         )
     return Block(scene, tuple(episodes), 2)
+
+
+def stuck_at_last(scene: Scene, seed: int, number: int) -> Block:
+    """Two such blocks, and then one that takes minutes."""
+    if number > 1:
+        time.sleep(200)
+    return quick(scene, seed, number)

@@ -301,6 +301,10 @@ def test_a_file_that_is_refused_loads_nothing_heavy(tmp_path):
         ]
         for file in (f"missing.{kind}", f"cut.{kind}")
     ] + [["view", "missing.yaml"], ["view", "run.csv", "--scene", "missing.yaml"]]  # fmt: skip
+    commands += [
+        [*words, "--scheduler", "nonsense"]
+        for words in (["simulate", "cut.json"], ["demonstrate", "cut.yaml", "-o", "set"])
+    ]
     code = (
         "import sys\n"
         "from flatpush.cli import main\n"

@@ -178,6 +178,15 @@ def test_a_push_of_one_sample_is_refused(plan):
         assert refused.value.key == f"segments[{[s is still for s in segments].index(True)}]"
 
 
+def test_fingers_far_away_are_refused_before_anything_is_simulated(plan):
+    (push,) = plan[0].pushes
+    far = replace(push, fingers=np.array([[0.0, 1e9]]))
+    damaged = replace(plan[0], segments=tuple(far if s is push else s for s in plan[0].segments))
+    with pytest.raises(fp.InputError, match="1000 times the object's size") as refused:
+        damaged.check_motion()
+    assert refused.value.key == f"segments[{[s is far for s in damaged.segments].index(True)}].fingers"
+
+
 def test_the_slow_way_is_told_with_the_time_that_it_takes(plan, monkeypatch, capsys):
     """Feet on one line are not compiled; by a clock on which a step takes half a second."""
     found, (push,) = plan[0], plan[0].pushes

@@ -176,32 +176,28 @@ import signal
 import sys
 sys.path.insert(0, {tests!r})
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from quick_episodes import quick
+import quick_episodes
 from flatpush.gym import demonstrations
-demonstrations.demonstrated = quick
+demonstrations.demonstrated = quick_episodes.{blocks}
 from flatpush.cli import main
 main()
 """
+
+
+def demonstrating(folder, blocks):
+    """The command with a function of tests/quick_episodes.py that makes its blocks."""
+    scene = folder / "scene.json"
+    scene.write_text(json.dumps(scene_document(SCENE)))
+    code = QUICK.format(tests=str(Path(__file__).parents[1]), blocks=blocks)
+    return [sys.executable, "-c", code, "demonstrate", str(scene), "-o", str(folder / "set")]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
 def test_what_was_broken_off_is_readable_and_goes_on(tmp_path, how):
     """Broken off between or in its writes, it ends as one that was not: the same frames in the same order."""
-    scene = tmp_path / "scene.json"
-    scene.write_text(json.dumps(scene_document(SCENE)))
     info = tmp_path / "set" / "meta" / "info.json"
-    tests = str(Path(__file__).parents[1])
-    words = [
-        sys.executable,
-        "-c",
-        QUICK.format(tests=tests),
-        "demonstrate",
-        str(scene),
-        "-o",
-        str(info.parents[1]),
-    ]
-    words += ["--workers", "1", "--seed", "3", "-n"]
+    words = [*demonstrating(tmp_path, "quick"), "--workers", "1", "--seed", "3", "-n"]
     with started([*words, "100000"], stderr=subprocess.PIPE) as running:
         until(lambda: info.exists() and json.loads(info.read_text())["total_episodes"] >= 4)
         running.send_signal(getattr(signal, how))
@@ -217,6 +213,21 @@ def test_what_was_broken_off_is_readable_and_goes_on(tmp_path, how):
     ours, whole = (check(tmp_path / name) for name in ("set", "whole"))
     assert ours[1] == whole[1]
     assert ours[0]["total_frames"] == whole[0]["total_frames"]
+
+
+@pytest.mark.slow
+def test_ctrl_c_does_not_wait_for_blocks_that_are_being_made(tmp_path):
+    """They take minutes, and only the command itself is told; its workers end with it."""
+    info = tmp_path / "set" / "meta" / "info.json"
+    with started(
+        [*demonstrating(tmp_path, "stuck_at_last"), "--workers", "2"], stderr=subprocess.PIPE
+    ) as one:
+        until(lambda: info.exists() and json.loads(info.read_text())["total_episodes"] == 4)
+        one.send_signal(signal.SIGINT)
+        _, said = one.communicate(timeout=PATIENCE)
+    assert one.returncode == 130, said
+    assert "Traceback" not in said
+    assert check(tmp_path / "set")[0]["total_episodes"] == 4
 
 
 def test_a_full_disk_is_named(tmp_path, monkeypatch):

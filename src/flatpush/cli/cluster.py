@@ -1,7 +1,5 @@
 """Spreads work over the processes of a Dask cluster: a local one, or one that exists."""
 
-import asyncio
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -15,6 +13,12 @@ PATIENCE = 8.0  # [s] for a scheduler to find workers
 ANSWER = 1.0  # [s] for it to say who it is
 
 
+def check_address(scheduler: str) -> None:
+    """Refuses what cannot be the address of a scheduler, before anything is imported that takes long."""
+    if not scheduler.rpartition(":")[2].rstrip("/").isdigit():
+        raise _no_answer(scheduler, "no Dask scheduler answers where there is no port")
+
+
 @contextmanager
 def cluster(scheduler: str | None) -> Iterator["Mapper"]:
     """A function like map whose calls run on the workers of the scheduler at an address, or of a local cluster.
@@ -23,10 +27,15 @@ def cluster(scheduler: str | None) -> Iterator["Mapper"]:
         MissingExtra: without dask.distributed.
         InputError: if no scheduler answers at the address within a few seconds.
     """
+    if scheduler is not None:
+        check_address(scheduler)
     try:
         import distributed
     except ImportError:
         raise MissingExtra('a cluster needs dask.distributed: pip install "flatpush[cluster]"') from None
+    import asyncio
+    import logging
+
     import dask
 
     with dask.config.set(
@@ -48,12 +57,7 @@ def cluster(scheduler: str | None) -> Iterator["Mapper"]:
             asyncio.run(asyncio.wait_for(_ask(scheduler), ANSWER))
             client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError, TypeError) as error:
-            raise InputError(
-                f"no Dask scheduler answers within {ANSWER:.0f} s",
-                key="--scheduler",
-                value=scheduler,
-                hint="Start one with: dask scheduler; its address looks like tcp://host:8786.",
-            ) from error
+            raise _no_answer(scheduler, f"no Dask scheduler answers within {ANSWER:.0f} s") from error
         with client:
             if not client.scheduler_info()["workers"]:
                 try:
@@ -76,8 +80,6 @@ async def _ask(scheduler: str) -> None:
     """
     from distributed.comm import connect
 
-    if not scheduler.rpartition(":")[2].rstrip("/").isdigit():
-        raise ValueError("an address ends with a port")
     comm = await connect(scheduler, timeout=ANSWER)
     try:
         await comm.write({"op": "identity", "reply": True})
@@ -86,6 +88,11 @@ async def _ask(scheduler: str) -> None:
         comm.abort()
     if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
         raise ValueError("what answers is no scheduler")
+
+
+def _no_answer(scheduler: str, rule: str) -> InputError:
+    hint = "Start one with: dask scheduler; its address looks like tcp://host:8786."
+    return InputError(rule, key="--scheduler", value=scheduler, hint=hint)
 
 
 class Mapper:

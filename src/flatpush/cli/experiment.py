@@ -100,6 +100,10 @@ def _all(
     scheduler: str | None,
     as_json: bool,
 ) -> int:
+    if scheduler is not None:
+        from .cluster import check_address
+
+        check_address(scheduler)
     from dataclasses import asdict
 
     from ..documents.atomic import check_writable, write_atomically

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import numpy as np
 
@@ -108,6 +108,7 @@ def blocks(
         while True:
             yield demonstrated(scenes[number % len(scenes)], seed, number)
             number += 1
+    others = set(active_children())
     with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
         try:
             waiting = [
@@ -120,8 +121,10 @@ def blocks(
                 waiting.append(pool.submit(demonstrated, scenes[number % len(scenes)], seed, number))
                 number += 1
                 yield done
-        finally:
-            pool.shutdown(cancel_futures=True)
+        finally:  # what runs still is not wanted, and would take minutes
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in set(active_children()) - others:
+                worker.terminate()
 
 
 def _demonstrated(job: Job) -> Block:

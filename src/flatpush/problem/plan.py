@@ -12,6 +12,8 @@ from ..geometry.pose import Array
 from .certificate import Certificate
 from .scene import Scene
 
+FARTHEST = 1e3  # fingertips from their hand, by the object's size: a turn moves them by as many steps of a simulation
+
 
 @dataclass(frozen=True, eq=False)
 class Arc:
@@ -143,7 +145,7 @@ class Plan:
         """Refuses a plan that nobody can follow.
 
         Raises:
-            InputError: for a plan without a solution, and for a push or slide without motion.
+            InputError: for a plan without a solution, and for a push or slide without motion or with fingers far away.
         """
         if self.status != "solved":
             raise InputError("there is no plan to follow", hint=self.reason)
@@ -156,6 +158,7 @@ class Plan:
                     key=f"segments[{i}]",
                     hint="The plan is damaged; plan anew.",
                 )
+            check_fingers(segment.fingers, self.scene.object.outline.size, f"segments[{i}].fingers")
 
     def save(self, path: str | Path) -> None:
         """Writes the plan document (JSON, SI), whole or not at all."""
@@ -174,6 +177,16 @@ class Plan:
         if not self.scene.free_angle:
             return self.scene.goal_pose
         return np.array([*self.scene.goal_pose[:2], self.final_pose()[2]])
+
+
+def check_fingers(tips: Array, size: float, key: str = "") -> None:
+    """Refuses fingertips (k, 2) [m] that are farther from their hand than FARTHEST times an object's size [m]."""
+    if np.max(np.hypot(tips[:, 0], tips[:, 1])) > FARTHEST * size:
+        raise InputError(
+            f"a fingertip is at most {FARTHEST:g} times the object's size from the hand's origin",
+            key=key,
+            value=tips.tolist(),
+        )
 
 
 @dataclass(frozen=True, eq=False)

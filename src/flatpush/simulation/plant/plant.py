@@ -12,13 +12,11 @@ from ...friction.surface import LimitSurface
 from ...geometry.pose import Array
 from ...problem import Object
 from ...problem.mechanics import surface_of
+from ...problem.plan import check_fingers
 from ...problem.scene import Model
 from .codes import AS_IT_IS, BODY, LEFT, MODES, OUTCOMES, RIGHT, STRAIGHT
 from .runner import Codes, Done, Runner, Task
 
-FARTHEST = (
-    1e3  # fingertips from their hand, by the outline's size: a turn moves them by as many steps of the plant
-)
 LONGEST = 2e4  # way of a hand in one run, by the outline's size: some ten seconds of compiled steps
 
 
@@ -126,11 +124,7 @@ class Plant:
             raise InputError("fingers are one or more points [x, y] in the pusher's frame", value=fingers)
         if not (np.isfinite(tip_radius) and tip_radius >= 0):
             raise InputError("a tip radius is a finite number, 0 or more", value=tip_radius)
-        if np.max(np.hypot(*tips.T)) > FARTHEST * thing.outline.size:
-            raise InputError(
-                f"a fingertip is at most {FARTHEST:g} times the object's size from the hand's origin",
-                value=tips.tolist(),
-            )
+        check_fingers(tips, thing.outline.size)
         mu = thing.friction if friction is None else float(friction)
         if not (np.isfinite(mu) and mu >= 0):
             raise InputError("friction is a finite number, 0 or more", value=friction)
