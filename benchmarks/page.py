@@ -113,8 +113,8 @@ def stroke(browser: webdriver.Chrome, moves: int, place: Callable[[int], tuple[f
     mouse("mouseReleased", moves)
 
 
-def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
-    """Times from a step that is asked for to the object that has moved [ms], while the pointer pushes it at 60 Hz."""
+def pushed(browser: webdriver.Chrome, moves: int) -> tuple[list[float], float]:
+    """Times from a step that is asked for to the object that has moved [ms], and how long the pointer pushes [s]."""
     browser.execute_script("document.getElementById('push').click(); flatpush.hand.frames.length = 0;")
     x, y, _, high = browser.execute_script(
         "const b = document.querySelector('#hand .body').getBoundingClientRect();"
@@ -124,10 +124,12 @@ def pushed(browser: webdriver.Chrome, moves: int) -> list[float]:
     def place(k: int) -> tuple[float, float]:
         return x - 20 + 60 * k / moves, y + high / 2
 
+    began = time.perf_counter()
     stroke(browser, moves, place)
+    spent = time.perf_counter() - began
     times = [float(v) for v in browser.execute_script("return flatpush.hand.frames")]
     browser.execute_script("document.getElementById('push').click();")
-    return times
+    return times, spent
 
 
 def dragged(
@@ -193,9 +195,9 @@ def main() -> None:
                     times, used_up = dragged(browser, cpu, thing, moves)
                     found[f"{name}: {thing} dragged"] = {"paths": len(times), **said(times, used_up)}
                 if name == "free":
-                    before, began = cpu(), time.perf_counter()
-                    times = pushed(browser, moves)
-                    rate = round(len(times) / (time.perf_counter() - began), 1)
+                    before = cpu()
+                    times, long = pushed(browser, moves)
+                    rate = round(len(times) / long, 1)
                     used_up = {key: value - before[key] for key, value in cpu().items()}
                     found["pushed by the pointer"] = {"steps a second": rate, **said(times, used_up)}
                 server.send_signal(signal.SIGINT)

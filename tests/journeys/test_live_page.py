@@ -178,6 +178,29 @@ def test_an_obstacle_is_added_blocks_is_moved_and_removed(page):
     assert page.js(named) == []
 
 
+def test_a_gap_that_is_too_narrow_is_shown_where_it_is(page):
+    """Between two walls, a foot apart: the widest disc that gets through touches both."""
+    walls = [[[-400, y], [400, y], [400, y + 5], [-400, y + 5]] for y in (-150, 145)]
+    walls += [
+        [[-30, -145], [-25, -145], [-25, -12], [-30, -12]],
+        [[-30, 6], [-25, 6], [-25, 145], [-30, 145]],
+    ]
+    page.js(
+        "flatpush.model.change((scene) => { scene.start = [-150, 0, 0]; scene.goal = [100, 0, 0];"
+        f" scene.workspace = {{bounds: [-400, -150, 400, 150], obstacles: {walls}}}; }})"
+    )
+    page.wait("document.querySelector('#places .narrow')")
+    ring = page.js(
+        "const n = document.querySelector('#places .narrow');"
+        "return ['cx', 'cy', 'r'].map((name) => Number(n.getAttribute(name)))"
+    )
+    assert -30 <= ring[0] <= -25
+    assert ring[1:] == pytest.approx([-3.0, 9.0], abs=0.1)
+    named = page.js("return [...document.querySelectorAll('.blamed')].map((node) => node.dataset.item)")
+    assert named == ["obstacle:2", "obstacle:3"]
+    assert "the widest way" in page.js("return document.querySelector('#places .narrow title').textContent")
+
+
 def test_a_corner_of_an_obstacle_is_moved_and_one_is_put_between(page):
     page.press("a")
     page.settle()

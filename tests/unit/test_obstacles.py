@@ -213,8 +213,17 @@ def test_walled_in_goals_end_with_words():
         np.array([(a, 0.06), (b, 0.06), (b, 0.0886), (a, 0.0886)]) for a, b in ((0.0, 0.08), (0.092, 0.23))
     ]
     slit = replace(scene, workspace=replace(scene.workspace, obstacles=(*scene.workspace.obstacles, *parts)))
-    told = re.search(r"no way is wider than ([\d.]+) mm", fp.Planner(slit).plan().reason)
+    reason = fp.Planner(slit).plan().reason
+    told = re.search(r"no way is wider than ([\d.]+) mm", reason)
     assert float(told[1]) == pytest.approx(12.0 - 2 * 1000 * scene.planning.clearance, abs=0.1)
+    # And where: in the middle of the slit, between the two walls.
+    spot = re.search(
+        r"narrowest at \(([-\d.]+), ([-\d.]+)\) mm, between obstacle (\d+) and obstacle (\d+)\.", reason
+    )
+    assert float(spot[1]) == pytest.approx(86.0, abs=0.1)
+    assert 60.0 < float(spot[2]) < 88.6
+    count = len(scene.workspace.obstacles)
+    assert {int(spot[3]), int(spot[4])} == {count, count + 1}
     # A slit that a disc inside the object passes, but not the object with fingers.
     gap = np.array([(0.0, 0.06), (0.078, 0.06), (0.078, 0.0884), (0.0, 0.0884)])
     other = np.array([(0.104, 0.06), (0.23, 0.06), (0.23, 0.0884), (0.104, 0.0884)])

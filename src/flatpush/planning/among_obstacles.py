@@ -15,7 +15,7 @@ from ..problem import PushSegment, Scene, TransitSegment
 from ..steering.fleet import Fleet
 from .assembly import Segments, assemble
 from .empty_table import Found, refined_paths
-from .obstacles import FINE_KNOT, KNOT, Search, careful, obstructions, pruned, query_of, widest_way
+from .obstacles import FINE_KNOT, KNOT, Search, WidestWay, careful, obstructions, pruned, query_of, widest_way
 from .options import PushOption
 from .path import Path
 from .segments import SAG
@@ -179,12 +179,13 @@ class AmongObstacles:
         if self.complaint and not search.nodes:
             return self.complaint
         less = ", less clearance (planning.margin.clearance)" if need > 0 else ""
-        way, wide = (2000 * radius for radius in widest_way(self.query))
+        widest = widest_way(self.query)
+        way, wide = 2000 * widest.radius, 2000 * widest.largest
         if search.closed or way < 0.999 * wide:
             room = f"no way is wider than {way:.1f} mm" if way > 0 else "nothing gets through at all"
             return (
                 f"the object does not fit through from the start to the goal{keeping}.\n"
-                f"{room}, and the object is {wide:.1f} mm wide (the largest disc inside it).\n"
+                f"{room}, and the object is {wide:.1f} mm wide (the largest disc inside it).{_narrow(widest)}\n"
                 f"A wider gap{less} or another start or goal would help."
             )
         within = f" in {self.scene.planning.iterations} iterations" if self.stopped_by == "iterations" else ""
@@ -259,3 +260,14 @@ def _stretches(points: Array, heights: Array) -> list[tuple[int, int]]:
                 continue
         found.append((k, k + 1))
     return found
+
+
+def _narrow(widest: WidestWay) -> str:
+    """Where the way is too narrow, as a line of the reason."""
+    if widest.narrowest is None:
+        return ""
+    x, y = (1000 * v for v in widest.narrowest)
+    where = (
+        f"between {' and '.join(widest.beside)}" if len(widest.beside) == 2 else f"beside {widest.beside[0]}"
+    )
+    return f"\nIt is narrowest at ({x:.1f}, {y:.1f}) mm, {where}."

@@ -227,8 +227,10 @@ export class Table {
     this.blame(plan && plan.status !== "solved" ? plan.reason || "" : "");
   }
 
-  /* What the reason names stands out: the end that does not fit, and what it meets. */
+  /* What the reason names stands out: the end that does not fit, what it meets, and where a way is too narrow. */
   blame(reason) {
+    const width = /no way is wider than ([\d.]+) mm/.exec(reason), spot = /narrowest at \((-?[\d.]+), (-?[\d.]+)\) mm/.exec(reason);
+    if (width && spot) find("places").append(svg("circle", { class: "narrow", cx: spot[1], cy: spot[2], r: width[1] / 2 }, svg("title", {}, `the widest way: ${width[1]} mm`)));
     const named = [...reason.matchAll(/\bobstacle (\d+)/g)].map(([, k]) => Number(k));
     [...find("obstacles").children].forEach((node, k) => node.classList.toggle("blamed", named.includes(k)));
     for (const name of ENDS) find(name).classList.toggle("blamed", reason.includes(`at the ${name} `));

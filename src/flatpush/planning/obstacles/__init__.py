@@ -10,13 +10,14 @@ from .polish.polish import KNOT
 from .prune import pruned
 from .scene_query import careful, obstructions, query_of
 from .search import FINE_KNOT, Search
-from .widest_way import widest_way
+from .widest_way import WidestWay, widest_way
 
 __all__ = [
     "FINE_KNOT",
     "KNOT",
     "TOUCHING",
     "Search",
+    "WidestWay",
     "careful",
     "check_endpoints",
     "check_region",
