@@ -22,6 +22,8 @@ TABLE = 0.3  # friction between feet and table
 TIP_MASS = 0.3  # of a finger [kg]
 STEM = 0.08  # length of a finger [m]
 # Of the tool's drives: stiffness [N/m] and damping [N s/m]; of the turning drive by LEVER² [N m/rad].
+# It has the inertia of a finger at LEVER: MuJoCo finds contact forces without the damping that its integrator adds, so
+# a tip without inertia counted as spun by every change of its turn rate, and kicked the object away.
 STIFFNESS, DAMPING, LEVER = 4e4, 400.0, 0.03
 STEP = 0.001  # [s]
 # Time constants [s] and impedances of contacts. MuJoCo's cone lifts what slides: a stiff foot hops, carries now nothing
@@ -91,7 +93,7 @@ def cell_xml(scene: Scene, tips: Array, physics: Physics, arm: Arm | None = None
     )
     holder = f"""<body name="tool" gravcomp="1"><joint name="tool-x" type="slide" axis="1 0 0"/>
 <joint name="tool-y" type="slide" axis="0 1 0"/><joint name="tool-z" type="slide" axis="0 0 1"/>
-<joint name="tool-turn" type="hinge" axis="0 0 1"/>{fingers}</body>"""
+<joint name="tool-turn" type="hinge" axis="0 0 1" armature="{TIP_MASS * LEVER**2}"/>{fingers}</body>"""
     if arm is not None:
         more, holder, drives = MODELS[arm.name](arm, fingers, -high / 2 - FOOT)
         assets += more
