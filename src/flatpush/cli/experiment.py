@@ -120,7 +120,11 @@ def _all(
             check_writable(output)
             output.mkdir()
         check_writable(output / REPORT)
-    done = 0
+    done, count = 0, os.cpu_count() or 1
+    where = "on the cluster" if on_cluster or scheduler else f"in {count} processes"
+    typer.echo(
+        f"{len(SECTIONS)} experiments {where}, the longest first; each is told when it is done", err=True
+    )
 
     def told(one: Done) -> None:
         nonlocal done
@@ -138,7 +142,7 @@ def _all(
         with cluster(scheduler) as spread:
             found = everything(quick, folder, spread, told)
     else:
-        found = everything(quick, folder, in_processes(os.cpu_count() or 1), told)
+        found = everything(quick, folder, in_processes(count), told)
     if output is not None:
         write_atomically(output / REPORT, page(found, _machine(), quick))
     if as_json:

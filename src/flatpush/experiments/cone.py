@@ -25,12 +25,12 @@ STILL = Noise(position=0.0, angle=0.0, friction=0.0)
 
 @dataclass(frozen=True)
 class Case:
-    """An object of the paper, its limit surface diag(a, a, b) and the points where its sides are pushed [m]."""
+    """An object of the paper, its limit surface diag(a, a, b) and where its sides are pushed [m]."""
 
     name: str
     corners: tuple[tuple[float, float], ...]
     surface: tuple[float, float]
-    places: tuple[tuple[float, float], ...]
+    places: dict[str, tuple[float, float]]
     switching: float
 
 
@@ -39,14 +39,14 @@ CASES = (
         "rectangle",
         ((-0.0255, -0.018), (0.0255, -0.018), (0.0255, 0.018), (-0.0255, 0.018)),
         (1.02150679, 1936.73374),
-        ((-0.0255, 0.0), (0.0255, 0.0), (0.0, -0.018), (0.0, 0.018)),
+        {"left": (-0.0255, 0.0), "right": (0.0255, 0.0), "bottom": (0.0, -0.018), "top": (0.0, 0.018)},
         0.03,
     ),
     Case(
         "triangle",
         ((0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)),
         (0.963910372, 2704.48587),
-        ((0.0, -0.0095), (0.019667, 0.00475), (-0.003719, 0.007704)),
+        {"long edge": (0.0, -0.0095), "short edge": (0.019667, 0.00475), "hypotenuse": (-0.003719, 0.007704)},
         0.01,
     ),
 )
@@ -56,7 +56,7 @@ def scene(case: Case, start: Array, two_finger: str, margin: float) -> Scene:
     """A query: from a start to the origin, with both fingers, under one way to see them."""
     a, b = case.surface
     thing = Object(case.corners, "uniform", 0.3, Ellipsoid(np.diag([a, a, b])), name=case.name)
-    pushes = [Push(f"{k}", thing.outline.nearest(place), 2, 0.018) for k, place in enumerate(case.places)]
+    pushes = [Push(name, thing.outline.nearest(place), 2, 0.018) for name, place in case.places.items()]
     planning = Planning(
         two_finger=two_finger,  # type: ignore[arg-type]
         cost="pusher",

@@ -213,7 +213,7 @@ def _fig4(quick: bool, data: Path | None) -> Finding:
 
     paper = Gains(*map(np.array, fig4.PAPER_GAINS))
     perturbed, nominal = (fig4.tracked(paper, surface) for surface in (fig4.PERTURBED, fig4.NOMINAL))
-    strong = fig4.tracked(Gains.of(2.0), fig4.NOMINAL)
+    strong = [fig4.tracked(Gains.of(2.0), surface) for surface in (fig4.NOMINAL, fig4.PERTURBED)]
     found, closed = fig4.bias(fig4.R / fig4.UNIT)
 
     def words(e: np.ndarray) -> str:
@@ -228,16 +228,22 @@ def _fig4(quick: bool, data: Path | None) -> Finding:
             " and the start and the draw of the matrix that were drawn are only known as they are printed.",
         ),
         Row(
-            "the same with the nominal matrix",
+            "the paper's gains, nominal matrix",
             "",
             f"flat point {1000 * fig4.flat_error(nominal):.2f} mm off, heading {np.degrees(nominal[2]):.2f}°",
             "What the gains leave by themselves.",
         ),
         Row(
-            "the same with kp = kd = 4",
+            "kp = kd = 4, nominal matrix",
             "",
-            f"flat point {1000 * fig4.flat_error(strong):.4f} mm off, heading {np.degrees(strong[2]):.4f}°",
+            f"flat point {1000 * fig4.flat_error(strong[0]):.4f} mm off, heading {np.degrees(strong[0][2]):.4f}°",
             "Critically damped gains end where the paper's text says that the law ends.",
+        ),
+        Row(
+            "kp = kd = 4, perturbed matrix",
+            "",
+            f"flat point {1000 * fig4.flat_error(strong[1]):.2f} mm off, heading {np.degrees(strong[1][2]):.2f}°",
+            "Better gains do not make up for a wrong matrix: its flat point is elsewhere.",
         ),
         Row(
             "settled heading on a straight line, perturbed matrix",
@@ -266,10 +272,11 @@ def _cell(quick: bool, data: Path | None, figure: str) -> Finding:
         of_robot = "" if errors is None else f"; {len(errors)} recorded runs: {_mean(errors)}"
         rows.append(
             Row(
-                f"start ({', '.join(f'{v:g}' for v in start)}°): signed mean error (x, y, θ) at the end",
+                f"start ({', '.join(f'{v:g}' for v in start)}°): signed error (x [mm], y [mm], θ [°]) at the end,"
+                " mean ± 95 % interval",
                 "(" + ", ".join(f"{m:+.2f} ± {h:.2f}" for m, h in printed) + ")" + of_robot,
-                f"{len(case.ends)} runs: {_mean(case.errors * [1000, 1000, 180 / np.pi])},"
-                f" by {' – '.join(case.pushes)}",
+                f"{len(case.ends)} runs: {_mean(case.errors * [1000, 1000, 180 / np.pi])};"
+                f" pushes: {' – '.join(case.pushes)}",
                 "The last push goes straight to the goal here, and no camera adds its error; the robot's runs include"
                 " the map from camera to robot, 1.7 mm at the goal.",
             )
@@ -279,8 +286,12 @@ def _cell(quick: bool, data: Path | None, figure: str) -> Finding:
 
 
 def _mean(errors: np.ndarray) -> str:
-    """Of errors in mm and degrees."""
-    return "(" + ", ".join(f"{value:+.2f}" for value in errors.mean(axis=0)) + ")"
+    """Of errors in mm and degrees; of three and more with halves of their 95 % intervals."""
+    from .robot_runs import half_widths
+
+    few = len(errors) < 3
+    pairs = zip(errors.mean(axis=0), half_widths(errors), strict=True)
+    return "(" + ", ".join(f"{mean:+.2f}" + ("" if few else f" ± {half:.2f}") for mean, half in pairs) + ")"
 
 
 def _cone(quick: bool, data: Path | None) -> Finding:

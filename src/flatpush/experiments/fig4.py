@@ -18,7 +18,7 @@ from ..control.laws.steering_model import SteeringModel
 from ..control.loop.closed_loop import drive
 from ..control.tracking.learning_controller import LearningController
 from ..friction import Ellipsoid
-from ..geometry import compose, pose_error, wrap_angle
+from ..geometry import compose, pose_error, rotate, transform, wrap_angle
 from ..geometry.pose import Array
 from ..problem import Object
 from ..simulation.plant import Plant
@@ -32,6 +32,7 @@ PERTURBED = np.array([[1.0719, -0.0177, -0.1782], [-0.0177, 1.0417, 0.1599], [-0
 PAPER_GAINS = ((2.0, 0.5), (0.1, 0.05))
 PLANNED, CLAMPED, TRUE = 0.5, 0.7, 1.0  # friction: of the plan, of the controller's limit, of the simulation
 RATE, TIME = 60.0, 30.0
+DRAWN = 12  # squares on the way in the picture
 
 
 def matrix(normalised: Array) -> Array:
@@ -185,18 +186,16 @@ def run(folder: Path | None = None) -> str:
 
 
 def draw(path: Path) -> None:
-    """Reference and actual path of the flat point, and the errors over time, for both gains under the perturbed A."""
+    """As the paper: the planned motion, and the tracked one under the perturbed A; then the errors of both gains."""
     from ..view import drawing, legend, palette
     from ..view.panel import BOTTOM, LEFT, Panel
     from ..view.picture import save_picture
 
-    model = push_model()
-    ref = reference(model)
-    title = "Fig. 4: feedback linearisation under a perturbed table"
-    subtitle = "flat point on its Dubins path, and its distance from the reference; start off by (−1 mm, −2.5 mm, 3.6°)"
-    line = 1000 * np.array([ref.at(t).position for t in np.linspace(0, TIME, 600)])
+    model, ref, times = push_model(), reference(push_model()), np.arange(0, TIME + 0.5 / RATE, 1 / RATE)
+    wanted = np.array([ref.at(t).position for t in times])
+    ways = {"reference": wanted}
+    shown = {"reference": _poses(model, wanted)}
     looks = {"reference": drawing.Look("#b3b3b3", 3.0)}
-    paths, distances = {"reference": line}, {}
     for name, gains, colour in (
         ("paper's gains", Gains(*map(np.array, PAPER_GAINS)), palette.SIMULATED),
         ("kp = kd = 4", Gains.of(2.0), palette.GOAL),
@@ -206,27 +205,44 @@ def draw(path: Path) -> None:
             controller, [0.0, 1.0], [START + ERROR], matrix(PERTURBED), TIME, friction=TRUE, record=True
         )
         assert runs.object is not None
-        z = np.array([model.flat_of(pose)[:2] for pose in runs.object[0]])
-        t = np.arange(len(z)) / RATE
-        off = np.hypot(*(z - np.array([ref.at(k).position for k in t])).T)
-        looks[name] = drawing.Look(colour, 1.3)
-        paths[name], distances[name] = 1000 * z, np.stack([t, 1000 * off], axis=1)
-    entries = [legend.Entry(name, look) for name, look in looks.items()]
-    edge, top, high = legend.EDGE, legend.title_height(title, subtitle), 230.0
+        shown[name], looks[name] = runs.object[0], drawing.Look(colour, 1.3)
+        ways[name] = np.array([model.flat_of(pose)[:2] for pose in runs.object[0]])
+    title = "Fig. 4: a square under feedback on a perturbed table"
+    subtitle = "left: as planned; middle: tracked with the paper's gains, begun (−1 mm, −2.5 mm, 3.6°) beside the start"
+    entries = [legend.Entry(f"flat point, {name}", look) for name, look in looks.items()]
+    edge, top, high, gap = legend.EDGE, legend.title_height(title, subtitle), 150.0, 12.0
     page = drawing.Drawing(drawing.PAGE, top + high + BOTTOM + legend.LINE + edge, title)
     legend.draw_title(page, title, subtitle)
     legend.draw_legend(page, entries, edge, top + high + BOTTOM, page.width)
-    wide = (page.width - 2 * edge) / 2 - LEFT - 6
-    every = np.concatenate(list(paths.values()))
-    low, up = every.min(axis=0) - 3, every.max(axis=0) + 3
-    table = Panel(page, (edge + LEFT, top, edge + LEFT + wide, top + high), (*low.tolist(), *up.tolist()))
-    most = 1.05 * max(float(rows[:, 1].max()) for rows in distances.values())
-    frame = (page.width - edge - wide, top, page.width - edge, top + high)
+    wide = (page.width - 2 * edge - 2 * gap) / 3 - LEFT
+    lefts = [edge + LEFT + k * (wide + LEFT + gap) for k in range(3)]
+    square = UNIT * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    every = 1000 * np.concatenate([transform(pose, square) for pose in shown["reference"]])
+    low, up = every.min(axis=0) - 4, every.max(axis=0) + 4
+    for left, name in zip(lefts, ("reference", "paper's gains"), strict=False):
+        table = Panel(page, (left, top, left + wide, top + high), (*low.tolist(), *up.tolist()))
+        table.axes()
+        last = len(shown[name]) - 1
+        for k in range(0, last + 1, last // DRAWN):
+            colour = palette.START if k == 0 else palette.GOAL if k + last // DRAWN > last else "#9a9a9a"
+            table.area(
+                1000 * transform(shown[name][k], square), drawing.Look(colour, 0.6 if 0 < k < last else 1.2)
+            )
+        for way in dict.fromkeys(("reference", name)):
+            table.line(1000 * ways[way], looks[way], 4)
+    distances = {k: 1000 * np.hypot(*(way - wanted).T) for k, way in ways.items() if k != "reference"}
+    most = 1.05 * max(float(np.max(off)) for off in distances.values())
+    frame = (lefts[2], top, lefts[2] + wide, top + high)
     errors = Panel(page, frame, (0.0, 0.0, TIME, most), equal=False)
-    table.axes()
-    errors.axes("time [s]", "distance from the reference [mm]")
-    for name, look in looks.items():
-        table.line(paths[name], look)
-        if name in distances:
-            errors.line(distances[name], look)
+    errors.axes("time [s]", "distance of the flat point [mm]")
+    for name, off in distances.items():
+        errors.line(np.stack([times, off], axis=1), looks[name])
     save_picture(page, path)
+
+
+def _poses(model: SteeringModel, flat: Array) -> Array:
+    """Poses of the object whose flat point drives along a path, shape (n, 3)."""
+    x, y, heading = model.flat_of(np.zeros(3))
+    steps = np.gradient(flat, axis=0)
+    theta = np.arctan2(steps[:, 1], steps[:, 0]) - heading
+    return np.column_stack([flat - rotate(theta, [x, y]), theta])

@@ -361,15 +361,12 @@ def draw(figure: str, found: list[Case], path: Path) -> None:
     ]
     entries.append(Entry("end", Look(INK, 0.8, fill=INK), "box"))
     corners = [
-        MM
-        * np.concatenate(
-            [outline_at(scene, pose) for way in case.ways for part in way for pose in part[[0, -1]]]
-        )
+        MM * np.concatenate([outline_at(scene, pose) for way in case.ways for part in way for pose in part])
         for case in found
     ]
     middles = [(points.min(axis=0) + points.max(axis=0)) / 2 for points in corners]
     half = np.max([np.ptp(points, axis=0) for points in corners], axis=0) / 2 + 4
-    top, above, gap = title_height(title, subtitle), 24.0, 8.0
+    top, above, gap = title_height(title, subtitle), 24.0, 22.0
     width = (PAGE - 2 * EDGE - LEFT + gap) / len(found) - gap
     height = width * float(half[1] / half[0])
     below = top + above + height + BOTTOM
