@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import flatpush as fp
-from flatpush.geometry import compose, pose_error
+from flatpush.contact import WrenchCone
+from flatpush.geometry import compose, perpendicular, pose_error, shift_twist
+from flatpush.problem.mechanics import contacts_of, named, placement_of
 
 RECTANGLE = [(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)]
 FEET = [(-0.018, -0.012), (0.02, -0.01), (0.004, 0.014), (-0.02, 0.008)]
@@ -35,6 +37,45 @@ def corners(weights, share):
             loads[k] += weights.sum() - loads.sum()
             if abs(loads[k] - weights[k]) <= share * weights[k] + 1e-12:
                 yield loads
+
+
+def heights(plan, loads, way):
+    """n · W of the faces of the fingers' cone, by the nominal wrench's size, for all motions of a plan with one push.
+
+    The object is off along its side: under a hand that moves as planned, its feet lie elsewhere.
+    """
+    scene, segment = plan.scene, plan.pushes[0]
+    contacts = contacts_of(scene, placement_of(scene, named(scene, segment.push)))
+    cone = WrenchCone.of(contacts)
+    feet, weights = scene.object.support.feet
+    at = feet - scene.object.cof + way * perpendicular(contacts[0].normal)
+    found = []
+    for arc in segment.arcs:
+        if arc.duration > 0:
+            V = shift_twist(arc.twist, scene.object.cof)
+            unit = V[:2] + V[2] * perpendicular(at)
+            unit /= np.linalg.norm(unit, axis=1)[:, None]
+            rows = np.column_stack([unit, (at[:, 0] * unit[:, 1] - at[:, 1] * unit[:, 0]) / cone.lever])
+            found.append(cone.faces @ (loads @ rows) / np.linalg.norm(weights @ rows))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.001, 0.004])
+def test_the_margin_of_a_set_is_the_least_over_the_corners_of_the_loads_and_the_faces(plan, offset):
+    """And, of an object that may be off in the hand, over all its places, a little on the safe side. The contacts were
+    moved along the object instead, and the hand's turning centres were not, which is another motion."""
+    _, weights = plan.scene.object.support.feet
+    found = fp.prove(plan, 0.1, offset=offset)
+    least = min(
+        np.min(heights(plan, loads, way))
+        for loads in corners(weights, 0.1)
+        for way in np.linspace(-offset, offset, 9 if offset else 1)
+    )
+    assert least - (0.005 if offset else 1e-12) <= found.margin <= least + 1e-12
+    worst = found.nearest
+    assert heights(plan, found.worst, worst.offset)[worst.arc].min() == pytest.approx(worst.depth, abs=1e-12)
+    assert (worst.number, worst.push, abs(worst.offset)) == (0, "side", offset)
+    assert (found.bounds.loads, found.bounds.friction, found.bounds.offset) == (0.1, 0.4, offset)
 
 
 def test_on_no_table_of_a_proved_set_does_anything_slide(plan):
@@ -93,6 +134,9 @@ def test_the_worst_table_slips_as_soon_as_the_set_is_larger(plan):
     assert found.worst.sum() == pytest.approx(1)
     run = on(plan, found.worst)
     assert any(mode.startswith("sliding") for mode in run.modes)
+    way = found.nearest.gives_way.rpartition(" ")[2]
+    assert found.nearest.gives_way == f"both fingers slide to the {way}"
+    assert f"sliding_{way}" in "+".join(run.modes)
 
 
 def test_less_friction_and_a_grasp_that_is_off_leave_less(plan):

@@ -12,7 +12,7 @@ import flatpush as fp
 from flatpush.contact import WrenchCone, narrowed
 from flatpush.contact.cone_twists import cone_twists
 from flatpush.contact.proved_twists import Bounds, NothingProved, proved_twists
-from flatpush.contact.table_set import WIDE, TableSet, set_twists, shifted
+from flatpush.contact.table_set import WIDE, TableSet, set_twists
 from flatpush.friction.patches import patches
 from flatpush.geometry import perpendicular
 
@@ -180,7 +180,7 @@ def test_within_a_patch_powers_leave_their_bounds_nowhere(name):
         places = np.array(places).transpose(1, 0, 2)
     first_used, second_used = [], []
     for V in turning(rng, 40):
-        g, first, second = (values[0] for values in tables._powers(cone, V[None], cone.faces))
+        g, first, second = (values[0] for values in tables._powers(cone.lever, V[None], cone.faces))
         v = V[:2] + V[2] * perpendicular(places)
         unit = v / np.linalg.norm(v, axis=-1)[..., None]
         torque = (places[..., 0] * unit[..., 1] - places[..., 1] * unit[..., 0]) / cone.lever
@@ -244,7 +244,7 @@ def test_turning_radii_of_a_rectangle(name, radii):
     reserve = WrenchCone.of(fingers(0.8 * 0.018, 0.8 * 0.3))
     found = []
     for share in (0.0, 0.1, 0.2, 0.4):
-        left, straight, right = set_twists(TableSet.of(support, share), [reserve], nominal)
+        left, straight, right = set_twists([TableSet.of(support, share)], reserve, nominal)
         finer = TableSet.of(support, share, 1500)
         for turn in (left, right):
             s = np.linspace(0, 1, 40)[:, None]
@@ -279,16 +279,18 @@ def refused(bounds, name="feet", beside=0.0):
 
 def least_depth(twists, support, contacts, bounds):
     """The least depth of twists (n, 3) over the vertices of the loads of feet and the ends of the offset, (n,)."""
-    cones = [
-        narrowed(pair, 0.2)
-        for pair in shifted([replace(c, friction=bounds.friction) for c in contacts], bounds.offset)
-    ]
-    feet = TableSet.of(support, 0.0)
+    cone, feet = (
+        narrowed([replace(c, friction=bounds.friction) for c in contacts], 0.2),
+        TableSet.of(support, 0.0),
+    )
     tables = [
-        fp.Support.points(feet.points, vertex(feet.weights, bounds.loads, np.array(order)))
+        fp.Support.points(
+            feet.points + np.array([way, 0.0]), vertex(feet.weights, bounds.loads, np.array(order))
+        )
         for order in permutations(range(len(feet.weights)))
+        for way in {-bounds.offset, 0.0, bounds.offset}
     ]
-    return np.min([cone.depth(table.wrench(twists)) for table in tables for cone in cones], axis=0)
+    return np.min([cone.depth(table.wrench(twists)) for table in tables], axis=0)
 
 
 @pytest.mark.parametrize(

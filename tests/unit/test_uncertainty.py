@@ -12,6 +12,7 @@ from flatpush.documents.reading import mapping_of
 from flatpush.documents.scene_reader import parse_scene
 from flatpush.errors import InputError
 from flatpush.geometry import perpendicular
+from flatpush.problem.certificate import SetBounds
 
 SCENE = {
     "flatpush": "scene/1",
@@ -44,8 +45,14 @@ def test_a_plan_is_proved_for_the_set_that_the_scene_states(plan, tmp_path):
     again = fp.prove(plan, 0.15, friction=0.35, offset=0.0003)
     assert again.proved
     assert again.margin == pytest.approx(certificate.set_margin)
+    assert certificate.set_uniqueness > 0
+    assert certificate.set_bounds == SetBounds(0.15, 0.35, 0.0003)
+    worst = certificate.set_worst
+    assert worst.push == plan.pushes[worst.number].push
+    assert certificate.set_margin <= worst.depth < certificate.set_margin + 0.04
     plan.save(tmp_path / "plan.json")
     loaded = load_plan(tmp_path / "plan.json")
+    assert (loaded.certificate.set_worst, loaded.certificate.set_bounds) == (worst, certificate.set_bounds)
     assert loaded.scene.object.uncertainty == fp.Uncertainty(0.15, (0.35, 0.5), 0.0003)
     assert fp.verify(loaded).ok
 
@@ -80,6 +87,29 @@ def test_a_nominal_plan_is_cheaper_and_fails_the_proof(plan):
     assert nominal.certificate.set_margin < 0
     believed = replace(nominal, scene=replace(scene, planning=replace(scene.planning, proof="set")))
     assert "set_margin kept" in [claim.name for claim in fp.verify(believed).failed]
+
+
+def test_verify_recomputes_what_is_said_of_the_set(plan):
+    """Of tables that are as bad as each other any may be named; plans of before name none."""
+    stated = plan.certificate
+
+    def failed(**changes):
+        lie = replace(plan, certificate=replace(stated, **changes))
+        return [claim.name for claim in fp.verify(lie).failed]
+
+    worst = stated.set_worst
+    loads = np.array(worst.loads)
+    evened = tuple((0.5 * (loads + 1 / len(loads))).tolist())
+    assert failed(set_worst=replace(worst, loads=evened)) == ["set_worst"]
+    assert failed(set_worst=replace(worst, loads=tuple((1.2 * loads).tolist()))) == ["set_worst"]
+    assert failed(set_worst=replace(worst, depth=worst.depth + 1e-4)) == ["set_worst"]
+    assert failed(set_worst=replace(worst, gives_way="nothing")) == ["set_worst"]
+    assert failed(set_worst=replace(worst, offset=2 * stated.set_bounds.offset)) == ["set_worst"]
+    assert failed(set_worst=replace(worst, number=len(plan.pushes))) == ["set_worst"]
+    assert failed(set_worst=replace(worst, face=(1.0, 0.0, 0.0))) == ["set_worst"]
+    assert failed(set_bounds=SetBounds(0.2, 0.35, 0.0003)) == ["set_bounds"]
+    assert failed(set_uniqueness=0.9) == ["set_uniqueness"]
+    assert not failed(set_worst=None, set_bounds=None, set_uniqueness=None)
 
 
 def test_the_larger_the_set_the_wider_the_turns():

@@ -252,6 +252,8 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
                 else ""
             )
         )
+    if certificate.set_worst is not None:
+        typer.echo(_set_text(certificate))
     if certificate.tube:
         known = scene.object.uncertainty
         region, (dx, dy) = known.start, certificate.set_end
@@ -269,6 +271,25 @@ def _tell(plan: Any, written: Sequence[Path | None]) -> None:
     for path in written:
         if path is not None:
             typer.echo(f"wrote {path}")
+
+
+def _set_text(certificate: Any) -> str:
+    """For which set of tables a plan is proved, or not, and what breaks it first."""
+    bounds, worst, unique = certificate.set_bounds, certificate.set_worst, certificate.set_uniqueness
+    x, y = (
+        1000 * sum(w * at for w, at in zip(worst.loads, places, strict=True))
+        for places in zip(*worst.points, strict=True)
+    )
+    said = ""
+    if unique is not None:
+        said = f"; sticking is {'' if unique > 0 else 'not shown to be '}all that can happen"
+    return (
+        f"{'proved' if certificate.set_margin >= 0 else 'not proved'} for loads within {100 * bounds.loads:.3g} %,"
+        f" friction from {bounds.friction:.3g} up and offsets up to {1000 * bounds.offset:.3g} mm: margin"
+        f" {certificate.set_margin:.3f}, it holds up to {100 * certificate.set_loads:.3g} % of the loads{said}\n"
+        f"worst table: push {worst.push}, arc {worst.arc + 1}, its centre of friction at ({x:.2f}, {y:.2f}) mm; beyond"
+        f" it {worst.gives_way}"
+    )
 
 
 def _margins(certificate: Any) -> str:

@@ -11,7 +11,7 @@ from ..errors import NoDubinsReduction
 from ..friction.support import Support
 from ..geometry.pose import Array
 from .point_contact import PointContact
-from .table_set import TableSet, has_car, set_twists, shifted
+from .table_set import TableSet, has_car, set_twists, side_along
 from .wrench_cone import WrenchCone, narrowed
 
 # The value of a bound up to which a car remains is told in two figures. It is sought until it is known to this share,
@@ -54,20 +54,20 @@ def proved_twists(
         bounds: of the set.
 
     Raises:
-        InputError: as TableSet.of and shifted.
+        InputError: as TableSet.of and side_along.
         NothingProved: if every car is lost on some table; it names the bound that does it.
     """
     tables = TableSet.of(support, bounds.loads)
 
-    def cones(b: Bounds) -> list[WrenchCone]:
-        pairs = shifted([replace(c, friction=b.friction) for c in contacts], b.offset)
-        return [narrowed(pair, reserve) for pair in pairs]
+    def within(b: Bounds) -> tuple[tuple[TableSet, ...], WrenchCone]:
+        held = replace(tables, share=b.loads).held(side_along(contacts, b.offset), b.offset)
+        return held, narrowed([replace(c, friction=b.friction) for c in contacts], reserve)
 
     def possible(b: Bounds) -> bool:
-        return has_car(replace(tables, share=b.loads), cones(b), nominal)
+        return has_car(*within(b), nominal)
 
     try:
-        return set_twists(tables, cones(bounds), nominal)
+        return set_twists(*within(bounds), nominal)
     except NoDubinsReduction as error:
         message = str(error)
     raise NothingProved(message, partial(_broken, possible, bounds, Bounds(0.0, contacts[0].friction, 0.0)))

@@ -13,8 +13,13 @@ Spread pressure is divided into patches. Where g - m changes its sign within a p
 by no more than a bound of first order, which is added to |g - m|. Elsewhere ∫ |g - m| dw̄ is the patch's load times
 |g - m| at the centroid but for a term of second order, since the linear one vanishes. So what is called kept is proved,
 and the answer is on the safe side by the square of the patches' size.
+
+An object that lies beside its place in the hand is turned about the same centres of the hand by contacts at the same
+places of it: its support alone lies elsewhere. The margins at three places along the side, less what ∫ g dw can fall
+short of the line between two of them, hold at all places between.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -46,10 +51,14 @@ NEARER = np.array([-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3])
 WIDE, TIGHT, STEPS, RUNGS = 100.0, 0.1, 40, 256
 # Points of the pressure on which families are compared, and how many of the best are then proved.
 SKETCH, TRIED = 64, 6
+# Places in the hand are so far apart at most, by the support's radius.
+STRIDE = 0.1
 # Patches that a spread pressure is divided into.
 PATCHES = 200
 # Normals of two contacts on one straight side differ by less [rad, and of the side's length].
 PARALLEL = 1e-9
+# A unit velocity seen from a point at a distance ρ that moves along a line has |û''| ≤ SWING / ρ².
+SWING = 2 / np.sqrt(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +66,16 @@ class WorstTable:
     """The table of a set that comes nearest to letting the object slip.
 
     Attributes:
-        margin: depth of its wrench in the composite cone (see WrenchCone.depth); negative where it lies outside.
+        margin: as TableSet.margin of the twist.
         loads: of the feet or patches, in parts of the whole, shape (n,).
         face: inward unit normal of the face that it comes nearest to, torque by the cone's lever, shape (3,).
+        depth: of its wrench under that face, by the nominal wrench's size; for feet in their place the margin itself.
     """
 
     margin: float
     loads: Array
     face: Array
+    depth: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +90,7 @@ class TableSet:
         share: δ, at least 0 and less than 1.
         points, weights: feet or centroids of patches, about the nominal centre of friction, shapes (n, 2) [m] and (n,).
         reach, along: of the patches, as friction.patches.Patches has them, shapes (n,) [m] and (n, 2).
+        step: from its place in the hand to a neighbour's; margins hold for all places between [m].
 
     >>> from flatpush.contact import PointContact
     >>> feet = Support.points([(-0.02, -0.01), (0.02, -0.01), (0.0, 0.02)])
@@ -94,6 +106,7 @@ class TableSet:
     weights: Array
     reach: Array
     along: Array
+    step: float = 0.0
 
     @classmethod
     def of(cls, support: Support, share: float, patches: int = PATCHES) -> "TableSet":
@@ -112,6 +125,25 @@ class TableSet:
         centred = support.centred()
         return cls(centred, float(share), *divided(centred.pressure, patches))
 
+    def held(self, along: Array, offset: float) -> tuple["TableSet", ...]:
+        """The set at places in the hand up to an offset [m] to either side along a unit vector (2,), its own first."""
+        if offset == 0:
+            return (self,)
+        steps = math.ceil(offset / (STRIDE * self.radius))
+        ways = [0.0] + [sign * (offset * k / steps) for k in range(1, steps + 1) for sign in (-1.0, 1.0)]
+        return tuple(self.placed(way * along, offset / steps) for way in ways)
+
+    def placed(self, way: Array, step: float = 0.0) -> "TableSet":
+        """The set moved in the hand by a way (2,) [m], for all places up to a step on [m]."""
+        return replace(self, support=self.support.translated(way), points=self.points + way, step=step)
+
+    def loaded(self, cone: WrenchCone, twist: ArrayLike, face: Array, loads: Array) -> float:
+        """The depth under a face (3,) of the wrench of given loads (n,), by the nominal wrench's size."""
+        V = np.asarray(twist, dtype=float).reshape(1, 3)
+        g, *_ = self._powers(cone.lever, V, face[None])
+        *_, size = self._ranges(cone.faces, cone.lever, V)
+        return float(g[0, 0] @ loads / size[0])
+
     @cached_property
     def radius(self) -> float:
         """Of the support [m]."""
@@ -125,17 +157,18 @@ class TableSet:
             twist: about the same point, shape (..., 3).
         """
         V = np.asarray(twist, dtype=float)
-        return np.asarray(np.min(self._heights(cone, V.reshape(-1, 3)), axis=1).reshape(V.shape[:-1]))
+        heights = self.heights(cone.faces, cone.lever, V.reshape(-1, 3))
+        return np.asarray(np.min(heights, axis=1).reshape(V.shape[:-1]))
 
     def worst(self, cone: WrenchCone, twist: ArrayLike) -> WorstTable:
         """The table that brings one twist (3,) nearest to slipping."""
         V = np.asarray(twist, dtype=float).reshape(1, 3)
-        heights = self._heights(cone, V)[0]
+        heights = self.heights(cone.faces, cone.lever, V)[0]
         face = int(np.argmin(heights))
         n = cone.faces[face]
-        g, *_ = self._powers(cone, V, n[None])
-        change = _extreme(g[0, 0], self.weights)
-        return WorstTable(float(heights[face]), self.weights * (1 - self.share * change), n)
+        g, *_ = self._powers(cone.lever, V, n[None])
+        loads = self.weights * (1 - self.share * _extreme(g[0, 0], self.weights))
+        return WorstTable(float(heights[face]), loads, n, self.loaded(cone, V, n, loads))
 
     def most(self, values: Array) -> float:
         """The greatest Σ w v over the loads of the set, of a value v for each point (n,)."""
@@ -149,38 +182,100 @@ class TableSet:
         is not kept on the nominal table.
         """
         V = np.asarray(twist, dtype=float)
-        nominal, spread, _ = self._ranges(cone, V.reshape(-1, 3))
+        nominal, spread, _ = self._ranges(cone.faces, cone.lever, V.reshape(-1, 3))
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(spread > nominal, nominal / spread, 1.0)
         return np.clip(np.min(share, axis=1), 0.0, 1.0).reshape(V.shape[:-1])
 
-    def _heights(self, cone: WrenchCone, V: Array) -> Array:
-        """The least depths under each face, shape (m, k)."""
-        nominal, spread, size = self._ranges(cone, V)
+    def heights(self, faces: Array, lever: float, V: Array) -> Array:
+        """The least n · W over all tables for each of twists (m, 3) and normals (k, 3), by the nominal wrench's size.
+
+        Args:
+            lever: torques are divided by it [m].
+
+        Returns:
+            shape (m, k).
+        """
+        nominal, spread, size = self._ranges(faces, lever, V)
         return np.asarray((nominal - self.share * spread) / size[:, None])
 
-    def _ranges(self, cone: WrenchCone, V: Array) -> tuple[Array, Array, Array]:
-        """n · W̄ and min ∫ |g - m| dw̄ for each face, shapes (m, k), and the sizes of the nominal wrenches (m,)."""
-        g, first, second = self._powers(cone, V, cone.faces)
+    def heights_between(self, faces: Array, lever: float, V: Array) -> Array:
+        """As heights, of all twists from each of V (m, 3) to the next while the turning centre moves straight.
+
+        Along its way û leaves the line between its two values by at most the chord between them, and, |û''| being at
+        most SWING/ρ², by SWING/8 of the square of the way over the distance ρ of the centre. What is near it may resist
+        in any direction: its power is taken as the least, where that is more.
+
+        Returns:
+            shape (m - 1, k).
+        """
+        nominal, spread, size = self._ranges(faces, lever, V)
+        unit, distance = self._velocities(V)
+        room = self.reach + self.step
+        with np.errstate(divide="ignore", invalid="ignore"):
+            centres = perpendicular(V[:, :2]) / V[:, 2:]
+            way = np.linalg.norm(np.diff(centres, axis=0), axis=1)[:, None]
+            near = np.maximum(0.5 * (distance[:-1] + distance[1:] - way) - room, UNDER * self.radius)
+            second = np.where(np.isfinite(way), SWING / 8 * (way / near) ** 2, np.inf)
+            seen = np.where(np.isfinite(way), 2 * np.arcsin(np.minimum(0.5 * way / near, 1.0)), np.pi)
+            around = np.where(distance > room, np.arcsin(np.minimum(room / distance, 1.0)), np.pi)
+        turn = np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=-1), -1.0, 1.0))
+        turn = np.minimum(seen, turn + around[:-1] + around[1:])
+        chord = np.fmin(2 * np.sin(0.5 * np.minimum(turn, np.pi)), second)[:, None]
+        arms = np.linalg.norm(_arms(faces, lever, self.points), axis=-1) + np.abs(faces[:, 2:]) / lever * room
+        g, first, _ = self._powers(lever, V, faces)
+        fall = g + first + arms  # to the least power
+        fall = np.where(
+            chord * arms * 2 < fall[:-1] + fall[1:], chord * arms, np.stack([fall[:-1], fall[1:]])
+        )
+        off = (1 + self.share) * fall @ self.weights
+        least = nominal - self.share * spread
+        ends = (np.stack([least[:-1], least[1:]]) - off) / np.stack([size[:-1], size[1:]])[..., None]
+        return np.asarray(np.min(ends, axis=0))
+
+    def _ranges(self, faces: Array, lever: float, V: Array) -> tuple[Array, Array, Array]:
+        """n · W̄ and min ∫ |g - m| dw̄ for each face, shapes (m, k), and the sizes of the nominal wrenches (m,).
+
+        Of places in the hand the first is less, and the second more, by what lies between.
+        """
+        g, first, second = self._powers(lever, V, faces)
         if np.any(self.reach > 0):
-            W = self.support.wrench(V) / [1.0, 1.0, cone.lever]
-            nominal = W @ cone.faces.T
+            W = self.support.wrench(V) / [1.0, 1.0, lever]
+            nominal = W @ faces.T
         else:
             nominal = g @ self.weights
-            W = self._wrenches(cone, V)
+            W = self._wrenches(lever, V)
         middle = _weighted_median(g, self.weights)
         off = np.abs(g - middle[..., None])
         spread = (off + np.where(off > first, np.minimum(first, second), first)) @ self.weights
         # By the nominal wrench's size, as a depth is.
         size = np.maximum(np.linalg.norm(W, axis=1), 1e-300)
+        if self.step > 0:
+            between = self._between(lever, V, faces) @ self.weights
+            nominal, spread = nominal - between, spread + between
         return nominal, spread, size
 
-    def _wrenches(self, cone: WrenchCone, V: Array) -> Array:
+    def _between(self, lever: float, V: Array, faces: Array) -> Array:
+        """By how much g may fall short of the line between its values here and a step aside, shape (m, k, n).
+
+        Along a line g = a · û has |g''| ≤ |a| |û''| + 2 |a'| |û'|; where a centre is near, its range tells more.
+        """
+        _, distance = self._velocities(V)
+        slope = np.abs(faces[:, 2:]) / lever
+        far = np.linalg.norm(_arms(faces, lever, self.points), axis=-1) + slope * (self.reach + self.step)
+        away = distance - self.reach
+        near = 1 / np.maximum(away - self.step, UNDER * self.radius)[:, None]
+        second = self.step**2 / 8 * (far * SWING * near**2 + 2 * slope * near)
+        turn = np.arcsin(np.clip(self.step / np.maximum(away, UNDER * self.radius), 0.0, 1.0))
+        chord = np.where(away > self.step, 2 * np.sin(0.5 * turn), 2.0)[:, None]
+        return np.minimum(second, 2 * np.minimum(far, far * chord + slope * self.step))
+
+    def _wrenches(self, lever: float, V: Array) -> Array:
         unit, _ = self._velocities(V)
         x, y = self.points.T
         torque = x * unit[..., 1] - y * unit[..., 0]
         return np.stack(
-            [unit[..., 0] @ self.weights, unit[..., 1] @ self.weights, torque @ self.weights / cone.lever], 1
+            [unit[..., 0] @ self.weights, unit[..., 1] @ self.weights, torque @ self.weights / lever], 1
         )
 
     def _velocities(self, V: Array) -> tuple[Array, Array]:
@@ -193,22 +288,20 @@ class TableSet:
             unit = np.where((distance > UNDER * self.radius)[..., None], v / speed[..., None], 0.0)
         return unit, distance
 
-    def _powers(self, cone: WrenchCone, V: Array, faces: Array) -> tuple[Array, Array, Array]:
+    def _powers(self, lever: float, V: Array, faces: Array) -> tuple[Array, Array, Array]:
         """g of each twist, face and point, and bounds for each patch, shapes (m, k, n).
 
         The bounds: of |g - g(p)| at every point of the patch, p its centroid, and of the mean of g - g(p) over it.
         """
         unit, distance = self._velocities(V)
-        x, y = self.points.T / cone.lever
-        # g = a · û with a = n_xy + n_τ perp(p), perp(p) = (-y, x).
-        a = faces[:, None, :2] + faces[:, None, 2:] * np.stack([-y, x], axis=1)
+        a = _arms(faces, lever, self.points)  # g = a · û
         g = np.einsum("mni,kni->mkn", unit, a)
         resting = ~np.any(unit != 0, axis=-1)
         if np.any(resting):
             g = np.where(resting[:, None], -np.linalg.norm(a, axis=-1), g)
         if not np.any(self.reach > 0):
             return g, np.zeros(1), np.zeros(1)
-        h, slope = self.reach, np.abs(faces[:, 2:]) / cone.lever  # |∇a|
+        h, slope = self.reach, np.abs(faces[:, 2:]) / lever  # |∇a|
         size = np.linalg.norm(a, axis=-1)
         # û turns by at most asin(h / d) within h of p; elsewhere, about a centre at d < h, it may be anything.
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -216,19 +309,24 @@ class TableSet:
             # At a distance ρ from the centre |∇û| = 1/ρ and |∇²û| ≤ 2/(√3 ρ²): û(φ) has unit derivatives, φ has
             # |∇φ| = 1/ρ and, being harmonic, ∇²φ with the eigenvalues ±1/ρ². A patch keeps ρ ≥ d - h.
             near = 1 / np.maximum(distance - h, UNDER * self.radius)[:, None]
-            second = 0.5 * h**2 * ((size + slope * h) * 2 / np.sqrt(3) * near**2 + 2 * slope * near)
+            second = 0.5 * h**2 * ((size + slope * h) * SWING * near**2 + 2 * slope * near)
             # ∇g = (ω/v) (a · perp(û)) û - n_τ perp(û), and along a straight piece only its part that way counts.
             swing = (
                 np.sign(V[:, 2:])[:, None]
                 * np.einsum("mni,kni->mkn", perpendicular(unit), a)
                 / distance[:, None]
             )
-        lean = -faces[:, 2:] / cone.lever
+        lean = -faces[:, 2:] / lever
         u, v = (np.einsum("mni,ni->mn", w, self.along)[:, None] for w in (unit, perpendicular(unit)))
         straight = np.any(self.along != 0, axis=1)
         rate = np.where(straight, np.abs(swing * u + lean * v), np.hypot(swing, lean))
         chord = 2 * np.sin(0.5 * turn)[:, None]
         return g, np.fmin(chord * size + slope * h, rate * h + second), second
+
+
+def _arms(faces: Array, lever: float, points: Array) -> Array:
+    """a = n_xy + n_τ perp(p) of normals (k, 3) and points (n, 2), shape (k, n, 2)."""
+    return np.asarray(faces[:, None, :2] + faces[:, None, 2:] * perpendicular(points) / lever)
 
 
 def _weighted_median(values: Array, weights: Array) -> Array:
@@ -254,25 +352,31 @@ def _extreme(g: Array, weights: Array) -> Array:
     return found
 
 
-def shifted(contacts: Sequence[PointContact], offset: float) -> list[list[PointContact]]:
-    """Two contacts in the extreme places that they may have along a straight side, an offset [m] either way.
+def side_along(contacts: Sequence[PointContact], offset: float) -> Array:
+    """The unit vector along the straight side that two contacts may be off along by an offset [m], shape (2,).
 
     Raises:
         InputError: for an offset on a side that is not straight.
     """
-    if offset == 0:
-        return [list(contacts)]
-    a, b = contacts
-    if float(a.normal @ b.normal) < 1 - PARALLEL or abs(float((b.point - a.point) @ a.normal)) > PARALLEL:
+    if offset != 0 and not is_straight(contacts):
         raise InputError(
             f"an offset of the grasp, here {1000 * offset:g} mm, needs two fingers on one straight side",
             hint="Leave the offset out, or push on a straight side.",
         )
-    along = perpendicular(a.normal)
-    return [[replace(c, point=c.point + s * offset * along) for c in (a, b)] for s in (-1.0, 0.0, 1.0)]
+    return np.asarray(perpendicular(contacts[0].normal))
 
 
-def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike) -> Array:
+def is_straight(contacts: Sequence[PointContact]) -> bool:
+    """Whether two contacts touch one straight side."""
+    a, b = contacts
+    return (
+        float(a.normal @ b.normal) >= 1 - PARALLEL
+        and abs(float((b.point - a.point) @ a.normal)) <= PARALLEL
+        and float(np.linalg.norm(b.point - a.point)) > PARALLEL
+    )
+
+
+def set_twists(tables: Sequence[TableSet], cone: WrenchCone, nominal: ArrayLike) -> Array:
     """A left turn, a straight motion and a right turn that every table of a set allows, turning as tightly as it can.
 
     Motions are looked at in families: a point ahead of the centre of friction, at shares of the distance of the nominal
@@ -281,8 +385,9 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     straight motion that is square to the line between them if every table allows it, else the nearest that is.
 
     Args:
-        cones: of the fingers in every place that they may have, about the nominal centre of friction; all must keep a
+        tables: at every place that they may have in the hand, their own first (see TableSet.held); all must keep a
             motion.
+        cone: of the fingers, about the nominal centre of friction.
         nominal: left, straight and right on the nominal table, shape (3, 3); see cone_twists.
 
     Returns:
@@ -291,26 +396,21 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     Raises:
         NoDubinsReduction: if the tables have no straight motion, or no turn to either side, in common.
     """
-
-    ways, families, leaning = _families(tables, cones, nominal)
+    ways, families, leaning = _families(tables, cone, nominal)
     if not len(ways):
         raise NoDubinsReduction("the fingers cannot push straight without slipping on every table of the set")
     shares = np.repeat(AHEAD, len(ways))
     # Which families turn tightest is seen on few points; how tightly they may is then proved.
-    sketch = (
-        tables
-        if len(tables.points) <= SKETCH
-        else replace(TableSet.of(tables.support, tables.share, SKETCH), reach=np.zeros(1))
-    )
+    sketch = [_sketched(place) for place in tables] if len(tables[0].points) > SKETCH else tables
     found = []
     for sense in (1.0, -1.0):
-        first = _turning_most(sketch, cones, families, np.outer(shares, leaning), sense)
+        first = _turning_most(sketch, cone, families, np.outer(shares, leaning), sense)
         best, near = (
             np.repeat(families[first], len(NEARER), axis=0),
             np.add.outer(shares[first], NEARER).ravel(),
         )
-        first = _turning_most(sketch, cones, best, np.outer(near, leaning), sense)
-        centres, tight = _tightest(tables, cones, best[first], np.outer(near[first], leaning), sense)
+        first = _turning_most(sketch, cone, best, np.outer(near, leaning), sense)
+        centres, tight = _tightest(tables, cone, best[first], np.outer(near[first], leaning), sense)
         found.append(centres[tight > 0])
     lefts, rights = found
     if not len(lefts) or not len(rights):
@@ -319,46 +419,56 @@ def set_twists(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
     left, right = lefts[pair // len(rights)], rights[pair % len(rights)]
     square = -perpendicular(left - right)
     square = square / np.hypot(*square)
-    if not _kept(tables, cones, np.array([*square, 0.0])):
+    if not _kept(tables, cone, np.array([*square, 0.0])):
         square = ways[int(np.argmax(ways @ square))]
     return np.stack([[*-perpendicular(left), 1.0], [*square, 0.0], [*perpendicular(right), -1.0]])
 
 
-def has_car(tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike) -> bool:
+def _sketched(tables: TableSet) -> TableSet:
+    """The same on few points, as if all pressed there."""
+    few = TableSet.of(tables.support, tables.share, SKETCH)
+    return replace(
+        few,
+        support=tables.support,
+        points=few.points + tables.support.centre,
+        reach=np.zeros(1),
+        step=tables.step,
+    )
+
+
+def has_car(tables: Sequence[TableSet], cone: WrenchCone, nominal: ArrayLike) -> bool:
     """Whether set_twists finds twists, in less time: whether families are kept straight on and in wide turns."""
-    ways, families, leaning = _families(tables, cones, nominal)
-    leans, widest = np.outer(np.repeat(AHEAD, len(ways)), leaning), _turns(tables, STEPS)[:1]
-    return all(np.any(_kept(tables, cones, _motions(families, leans, s * widest))) for s in (1.0, -1.0))
+    ways, families, leaning = _families(tables, cone, nominal)
+    leans, widest = np.outer(np.repeat(AHEAD, len(ways)), leaning), _turns(tables[0], STEPS)[:1]
+    return all(np.any(_kept(tables, cone, _motions(families, leans, s * widest))) for s in (1.0, -1.0))
 
 
-def _families(
-    tables: TableSet, cones: Sequence[WrenchCone], nominal: ArrayLike
-) -> tuple[Array, Array, Array]:
+def _families(tables: Sequence[TableSet], cone: WrenchCone, nominal: ArrayLike) -> tuple[Array, Array, Array]:
     """Straight ways (n, 2) that every table allows, the families' (a n, 2), and how one of share 1 leans, (2,)."""
     a, straight, b = np.asarray(nominal, dtype=float)
     straight = straight[:2] / np.hypot(*straight[:2])
     ahead = 0.5 * float(perpendicular(a[:2] / a[2] + b[:2] / b[2]) @ straight)
     ways = rotate(DIRECTIONS, straight)
-    depth = _depth(tables, cones, ways)
+    depth = _depth(tables, cone, ways)
     if np.count_nonzero(depth >= 0) <= FEW:
         ways = rotate(CLOSER, ways[int(np.argmax(depth))])
-        depth = _depth(tables, cones, ways)
+        depth = _depth(tables, cone, ways)
     ways = ways[depth >= 0]
     return ways, np.tile(ways, (len(AHEAD), 1)), -ahead * perpendicular(straight)
 
 
-def _depth(tables: TableSet, cones: Sequence[WrenchCone], ways: Array) -> Array:
-    """The least depth of straight motions (n, 2) over all tables and cones, shape (n,)."""
+def _depth(tables: Sequence[TableSet], cone: WrenchCone, ways: Array) -> Array:
+    """The least depth of straight motions (n, 2) over all tables, shape (n,)."""
     V = np.column_stack([ways, np.zeros(len(ways))])
-    return np.asarray(np.min([tables.margin(cone, V) for cone in cones], axis=0))
+    return np.asarray(np.min([place.margin(cone, V) for place in tables], axis=0))
 
 
-def _kept(tables: TableSet, cones: Sequence[WrenchCone], twists: Array) -> NDArray[np.bool_]:
-    """Whether twists (..., 3) are kept in every cone, shape (...)."""
+def _kept(tables: Sequence[TableSet], cone: WrenchCone, twists: Array) -> NDArray[np.bool_]:
+    """Whether twists (..., 3) are kept at every place, shape (...)."""
     V = twists.reshape(-1, 3)
     kept = np.arange(len(V))
-    for cone in cones:
-        kept = kept[tables.margin(cone, V[kept]) >= 0]
+    for place in tables:
+        kept = kept[place.margin(cone, V[kept]) >= 0]
     return np.isin(np.arange(len(V)), kept).reshape(twists.shape[:-1])
 
 
@@ -373,16 +483,16 @@ def _turns(tables: TableSet, steps: int) -> Array:
 
 
 def _turning_most(
-    tables: TableSet, cones: Sequence[WrenchCone], families: Array, leans: Array, sense: float
+    tables: Sequence[TableSet], cone: WrenchCone, families: Array, leans: Array, sense: float
 ) -> NDArray[np.intp]:
     """About TRIED of the families, those that every table still keeps in the tightest turns, as indices.
 
     By bisection over the rungs of turns, so it takes a family to be kept in all turns wider than one in which it is.
     """
-    turns, low, high, left = _turns(tables, RUNGS), 0, RUNGS, np.arange(len(families))
+    turns, low, high, left = _turns(tables[0], RUNGS), 0, RUNGS, np.arange(len(families))
     while low < high:
         middle = (low + high) // 2
-        kept = left[_kept(tables, cones, _motions(families[left], leans[left], sense * turns[[middle]]))]
+        kept = left[_kept(tables, cone, _motions(families[left], leans[left], sense * turns[[middle]]))]
         if len(kept) >= TRIED or (middle == 0 and len(kept)):
             low, left = middle + 1, kept
         else:
@@ -391,17 +501,17 @@ def _turning_most(
 
 
 def _tightest(
-    tables: TableSet, cones: Sequence[WrenchCone], families: Array, leans: Array, sense: float
+    tables: Sequence[TableSet], cone: WrenchCone, families: Array, leans: Array, sense: float
 ) -> tuple[Array, Array]:
     """Centres (n, 2) of the tightest turns of families that are kept from straight on, and turns per length (n,)."""
-    turns = _turns(tables, STEPS)
-    good = _kept(tables, cones, _motions(families, leans, sense * turns[:, None]))
+    turns = _turns(tables[0], STEPS)
+    good = _kept(tables, cone, _motions(families, leans, sense * turns[:, None]))
     count = np.where(good.all(axis=0), len(turns), np.argmin(good, axis=0))
     low = np.where(count > 0, turns[np.maximum(count - 1, 0)], 0.0)
     high = np.where(count < len(turns), turns[np.minimum(count, len(turns) - 1)], low)
     for _ in range(8):
         middle = 0.5 * (low + high)
-        fine = np.logical_and(_kept(tables, cones, _motions(families, leans, sense * middle)), low > 0)
+        fine = np.logical_and(_kept(tables, cone, _motions(families, leans, sense * middle)), low > 0)
         low, high = np.where(fine, middle, low), np.where(fine, high, middle)
     with np.errstate(divide="ignore", invalid="ignore"):
         V = _motions(families, leans, sense * low)

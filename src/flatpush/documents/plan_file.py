@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Arc, CarCentres, Certificate, Plan, PushSegment, Segment, SlideSegment, TransitSegment
-from ..problem.certificate import TubePart
+from ..problem.certificate import SetBounds, SetWorst, TubePart
 from .atomic import write_atomically
 from .plan_model import (
     CertificatePart,
@@ -205,6 +205,13 @@ def _read_certificate(part: CertificatePart | NoCertificatePart) -> Certificate 
         values["tube"] = tuple(
             TubePart(**{**one, "end": (float(one["end"][0]), float(one["end"][1]))}) for one in values["tube"]
         )
+    if values.get("set_bounds") is not None:
+        values["set_bounds"] = SetBounds(**values["set_bounds"])
+    if values.get("set_worst") is not None:
+        worst: dict[str, Any] = {**values["set_worst"]}
+        worst["points"] = tuple(tuple(point) for point in worst["points"])
+        worst["loads"], worst["face"] = tuple(worst["loads"]), tuple(worst["face"])
+        values["set_worst"] = SetWorst(**worst)
     values["warnings"] = tuple(values["warnings"])
     values["cars"] = {
         name: CarCentres(**{key: tuple(pair) for key, pair in car.items()})

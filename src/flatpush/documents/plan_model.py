@@ -102,6 +102,30 @@ class TubePartModel(Part):
     clearance: Finite | None = Field(default=None, description="That is kept during the push.")
 
 
+class SetBoundsPart(Part):
+    """The set of tables, fingers and places for which the margins of a set are."""
+
+    loads: Finite = Field(description="The share by which loads may differ from the nominal ones.")
+    friction: Finite = Field(description="The least coefficient of the fingers.")
+    offset: Finite = Field(description="Of the object along the side that is pushed, to either side at most.")
+
+
+class SetWorstPart(Part):
+    """The table of a set that comes nearest to letting the object slip, and what would give way."""
+
+    number: int = Field(description="Which of the plan's pushes, from 0.")
+    push: str = Field(description="Its name.")
+    arc: int = Field(description="Which of its arcs, from 0.")
+    offset: Finite = Field(description="Of the object along the side, to the left as seen along the push.")
+    depth: Finite = Field(description="Of its wrench under the face, by the nominal wrench's size.")
+    gives_way: str = Field(description="What happens beyond that face, in words.")
+    face: Vector3 = Field(
+        description="Its inward normal, for forces and the torque about the centre of friction."
+    )
+    points: list[Vector2] = Field(description="Feet or middles of patches.")
+    loads: list[Finite] = Field(description="Of each, in parts of the whole.")
+
+
 class CertificatePart(BaseModel):
     """What was proved or measured; null where it does not apply. A later version may know more keys."""
 
@@ -126,6 +150,14 @@ class CertificatePart(BaseModel):
     )
     set_loads: Finite | None = Field(
         default=None, description="The largest share by which loads may differ so that the plan still holds."
+    )
+    set_bounds: SetBoundsPart | None = Field(default=None, description="That set.")
+    set_worst: SetWorstPart | None = Field(
+        default=None, description="Its table that comes nearest to letting the object slip."
+    )
+    set_uniqueness: Finite | None = Field(
+        default=None,
+        description="How far motions other than sticking are from being possible; above 0, none is.",
     )
     set_end: Vector2 | None = Field(
         default=None, description="Half the sides of the box about the planned end that the object ends in."

@@ -43,6 +43,47 @@ class TubePart:
 
 
 @dataclass(frozen=True)
+class SetBounds:
+    """The set of tables, fingers and places for which the margins of a set are.
+
+    Attributes:
+        loads: pressure times table friction is within this share of its nominal value at every point.
+        friction: least Coulomb coefficient of the fingers; they hold for all above it too.
+        offset: of the object along the side that is pushed, to either side at most, in the push where it is most [m].
+    """
+
+    loads: float
+    friction: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class SetWorst:
+    """The table of a set that comes nearest to letting the object slip, and what would give way.
+
+    Attributes:
+        number, push, arc: which of the plan's pushes, from 0, its name, and which of its arcs, from 0.
+        offset: of the object along the side, to the left as seen along the push [m].
+        depth: n · W of its wrench W and the face n, by the nominal wrench's size, torques by the cone's lever. Of feet
+            without an offset it is the set's margin, which is else less by what the proof adds for patches and offsets.
+        gives_way: in words, what happens beyond that face.
+        face: n, the inward normal of the face of the fingers' composite cone, for forces and the torque about the
+            nominal centre of friction, along O's axes (without unit, without unit, 1/m).
+        points, loads: feet or middles of patches in O [m], and their loads in parts of the whole.
+    """
+
+    number: int
+    push: str
+    arc: int
+    offset: float
+    depth: float
+    gives_way: str
+    face: tuple[float, float, float]
+    points: tuple[Vector, ...]
+    loads: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Certificate:
     """The numbers that simulation.certify computes from a scene and its segments; None where one does not apply.
 
@@ -75,6 +116,11 @@ class Certificate:
             where it is not negative.
         set_loads: the largest share by which loads may differ so that the plan still holds, with the friction and
             offset of that set.
+        set_bounds: that set.
+        set_worst: its table that comes nearest to letting the object slip.
+        set_uniqueness: how far every motion of the object but sticking is from being possible on every table of that
+            set, a depth without unit: above 0, sticking is all that can happen (see contact.uniqueness); else that is
+            not shown. None for fingers on sides that are not straight.
         set_end: half the sides of the box in x and y about the planned end in which the object ends with any offset of
             that set along the fingers, its angle being the planned one [m]; with a start region, from all of it.
         set_clearance: clearance that remains with any such offset [m]; with a start region, from all of it.
@@ -102,6 +148,9 @@ class Certificate:
     model_offset: float | None = None
     set_margin: float | None = None
     set_loads: float | None = None
+    set_bounds: SetBounds | None = None
+    set_worst: SetWorst | None = None
+    set_uniqueness: float | None = None
     set_end: Vector | None = None
     set_clearance: float | None = None
     tube: tuple[TubePart, ...] | None = None

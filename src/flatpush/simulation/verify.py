@@ -9,13 +9,17 @@ import numpy as np
 from ..documents.scene_digest import SceneDifference, scene_differences, scene_digest
 from ..errors import FlatpushError, InputError
 from ..problem import Certificate, Plan, Scene
+from ..problem.certificate import SetWorst
 from ..problem.mechanics import proved_for_set, starts_anywhere
 from .claims import arc_costs, certify
 from .execution import Finding, execution_findings
+from .proof import worst_depth
 from .slides import slide_sensitivity
 from .tube import tube_excess
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
+# Keys of a certificate that plans of an earlier version do not have.
+LATER = {"set_bounds", "set_worst", "set_uniqueness"}
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
         _stated("cost", plan.cost, computed.cost),
         _stated("duration", plan.duration, computed.duration),
     ]
-    claims += _certified(plan.certificate, computed)
+    claims += _certified(plan, computed)
     claims += [
         _stated(f"word of {s.push}", s.word, "".join(a.turn[0].upper() for a in s.arcs)) for s in plan.pushes
     ]
@@ -151,13 +155,32 @@ def _same_scene(plan: Plan) -> list[Claim]:
     return [Claim("scene_digest", plan.scene_digest, digest, 0.0, same, "the scene it was planned for")]
 
 
-def _certified(stated: Certificate | None, computed: Certificate) -> list[Claim]:
-    """A claim for each number of a certificate."""
+def _certified(plan: Plan, computed: Certificate) -> list[Claim]:
+    """A claim for each number of a certificate; what older plans do not say of their set is none."""
+    stated = plan.certificate
     if stated is None:
         return [Claim("certificate", None, "one that can be computed", 0.0, False, "a plan has one")]
     found, told = asdict(computed), asdict(stated)
     unknown = [Claim(key, str(value), None, 0.0, False, "known") for key, value in told.pop("others").items()]
-    return [_stated(key, value, found[key]) for key, value in told.items()] + unknown
+    told = {key: value for key, value in told.items() if value is not None or key not in LATER}
+    told.pop("set_worst", None)
+    claims = [_stated(key, value, found[key]) for key, value in told.items()]
+    if stated.set_worst is not None:
+        claims.append(_set_worst(plan, stated.set_worst, computed))
+    return claims + unknown
+
+
+def _set_worst(plan: Plan, stated: SetWorst, computed: Certificate) -> Claim:
+    """That the table named as the worst is one of the set, gives what it is said to give, and none is worse.
+
+    Where several are as bad, rounding chooses among them, so that another may be named than is found here.
+    """
+    worst, bounds, ok = computed.set_worst, computed.set_bounds, False
+    if worst is not None and bounds is not None and abs(stated.offset) <= bounds.offset + ABSOLUTE:
+        depth = worst_depth(plan.scene, plan.pushes, stated)
+        ok = _agree(stated.depth, depth) and (stated.depth < worst.depth or _agree(stated.depth, worst.depth))
+    found = None if worst is None else asdict(worst)
+    return Claim("set_worst", asdict(stated), found, RELATIVE, ok, "a table of the set, and none is worse")
 
 
 def _stated(name: str, stated: Any, recomputed: Any) -> Claim:
