@@ -10,7 +10,7 @@ the end of the chain, which has to stay at the goal. An arc that vanishes is a b
   damping that grows until the cost falls; it stops at the first arc that vanishes, and is led back to the goal.
 * The multipliers λ of the end are the constant covector of the maximum principle. An arc of a motion that is not
   part of the chain pays at a place if its price is less than λ · (its column there): such arcs are taken in, at zero.
-* At the end every leg gets its cheapest word; while that pays, the descent is repeated (Query.descend).
+* At the end every leg gets its cheapest word; while that pays, the descent is repeated (descend).
 
 Legs must be at least `least` long, which is one more linear condition where it binds.
 """
@@ -22,7 +22,7 @@ import numpy as np
 
 from ...compiled import inner, kernel, shared
 from ...geometry.pose import Array
-from ...steering.six_words import CAR, LEFT, STRAIGHT, TURN, WORD, Records
+from ...steering.six_words import CAR, LEFT, STRAIGHT, TURN, WORD, Records, cheapest_word
 from ...steering.time_law import rest_to_rest
 
 MOST = 48  # arcs of a chain
@@ -51,10 +51,11 @@ ARC = np.dtype(
 
 
 class Work(NamedTuple):
-    """What a descent works on; the arrays are overwritten.
+    """What descents of a number of legs, one after the other, work on; the arrays are overwritten.
 
     Attributes:
         now, trial, spare: the chain, the one after a step, one arc; record arrays of ARC.
+        words: of the legs, six_words.WORD.
         K: the system of equations of a step. lam: its multipliers: of the end, then of the legs.
         legs: _lengths. short: whether a leg is held at the least length.
         phase: what a step is solved for, of one element.
@@ -65,6 +66,7 @@ class Work(NamedTuple):
     now: Records
     trial: Records
     spare: Records
+    words: Records
     K: Array
     lam: Array
     legs: Array
@@ -76,22 +78,18 @@ class Work(NamedTuple):
     free: bool
 
     @classmethod
-    def of(cls, words: Records, poses: Array, least: float, radius: float, free: bool = False) -> "Work":
-        """For a plan with these words (six_words.WORD, shape (m,)) between poses (m + 1, 3)."""
-        count = len(words)
-        goal = poses[-1].copy()
-        turned = float(np.sum(words["amount"] * (1 - words["letter"])))
-        goal[2] += TURN * np.floor((turned + poses[0, 2] - goal[2]) / TURN + 0.5)
+    def of(cls, count: int, least: float, radius: float, free: bool = False) -> "Work":
+        """For plans of so many legs."""
         size = MOST + 3 + count
         return cls(
-            np.zeros(MOST + 1, ARC), np.zeros(MOST + 1, ARC), np.zeros(1, ARC), np.empty((size, size + 1)),
-            np.zeros(3 + count), np.empty((count, 2)), np.zeros(count, np.bool_), np.zeros(1, np.int64), goal, least,
-            radius, free,
+            np.zeros(MOST + 1, ARC), np.zeros(MOST + 1, ARC), np.zeros(1, ARC), np.zeros(count, WORD),
+            np.empty((size, size + 1)), np.zeros(3 + count), np.empty((count, 2)), np.zeros(count, np.bool_),
+            np.zeros(1, np.int64), np.zeros(3), least, radius, free,
         )  # fmt: skip
 
 
 _CARS, _PUSHES, _LAM = np.zeros(1, CAR), np.zeros(1, np.int64), np.zeros(1)
-_WORK, _ARCS = Work.of(np.zeros(1, WORD), np.zeros((2, 3)), 0.0, 0.0), np.zeros(1, ARC)
+_WORK, _ARCS = Work.of(1, 0.0, 0.0), np.zeros(1, ARC)
 
 
 @inner
@@ -338,8 +336,65 @@ def _take_in(
 
 
 @kernel(lent=True)
-def descend(work: Work, cars: Records, pushes: np.ndarray, words: Records, poses: Array, steps: int) -> bool:
+def descend(
+    work: Work,
+    cars: Records,
+    pushes: np.ndarray,
+    poses: Array,
+    best: Array,
+    ends: Array,
+    repeats: int,
+    steps: int,
+) -> float:
+    """Words of the legs and descents from them in turns, while that pays.
+
+    Args:
+        poses: X_WO at start, switches and goal, shape (n + 1, 3); overwritten. best: the cheapest found, alike.
+        ends: start and goal, shape (2, 3), to which the words between the poses are led; (0, 3): those of the poses.
+        repeats: most descents, of so many steps each.
+
+    Returns:
+        The cost of the best without switching; inf: none was found in which every leg has the least length.
+    """
+    words, lowest, last = work.words, np.inf, len(pushes)
+    for j in range(3):
+        work.lam[j] = 0.0
+    for repeat in range(repeats + 1):
+        cost, shortest = 0.0, np.inf
+        for i in range(len(pushes)):
+            cost += cheapest_word(cars[pushes[i]], poses[i], poses[i + 1], words[i])
+            shortest = min(shortest, words[i].flat)
+        if cost == np.inf:
+            break
+        if repeat == 0 and len(ends) > 0:  # with the words so far: those from the new ends may jump
+            cost = np.inf
+            for j in range(3):
+                poses[0, j], poses[last, j] = ends[0, j], ends[1, j]
+        better = cost < lowest - 1e-7 * cost
+        if cost < lowest and shortest >= work.least * (1.0 - 1e-9):
+            lowest = cost
+            for i in range(last + 1):
+                for j in range(3):
+                    best[i, j] = poses[i, j]
+        if (
+            repeat == repeats
+            or (lowest < np.inf and not better)
+            or not _downhill(work, cars, pushes, poses, steps)
+        ):
+            break
+    return lowest
+
+
+@inner
+def _downhill(work: Work, cars: Records, pushes: np.ndarray, poses: Array, steps: int) -> bool:
     """One descent from the words of the legs; sets the inner poses and a free last angle. False: it cannot end well."""
+    words, turned = work.words, 0.0
+    for i in range(len(pushes)):
+        for j in range(3):
+            turned += words[i].amount[j] * (1.0 - words[i].letter[j])
+    for j in range(3):
+        work.goal[j] = poses[len(pushes), j]
+    work.goal[2] += TURN * math.floor((turned + poses[0, 2] - work.goal[2]) / TURN + 0.5)
     now, trial, legs, short, radius = work.now, work.trial, work.legs, work.short, work.radius
     n = 3 * len(pushes)
     for i in range(len(pushes)):

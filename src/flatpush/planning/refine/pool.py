@@ -1,10 +1,12 @@
 """Seeds: the best plan of every short push sequence over one pool of poses, as starts for the descent."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...geometry import compose, exp
 from ...geometry.pose import Array
-from .problem import Candidate, Sequences
+from .problem import Candidate, Sequences, joined
 
 MOST_SUMS = 3_000_000  # sums of one table cell and a cost to go, per pool: bounds the size of the table
 MOST_CELLS = 10_000  # of the table of cars that are not Dubins cars
@@ -53,43 +55,53 @@ def pool_seeds(sequences: Sequences, poses: Array, legs: int) -> list[Candidate]
     every = sequences.table(poses, sequences.endpoints)  # (k, m, e)
     nearest = np.argmin(every, axis=2)  # the end that each push best goes to
     last = np.take_along_axis(every, nearest[..., None], axis=2)[..., 0]
-    found: list[Choice] = []
-    pairs = _pairs(sigma)
-    for i, j in pairs:
-        sums = first[i] + last[j]
-        m = int(np.argmin(sums))
-        found.append((float(sums[m]) + sigma[i, j], (i, j), (m,)))
-    chosen = _keep(found, 2)
+    pairs = np.array([(i, j) for i in range(k) for j in range(k) if i != j and np.isfinite(sigma[i, j])])
+    pairs = pairs.reshape(-1, 2)
+    a, b = pairs.T
+    ends, sums = _least(first[a] + last[b])
+    chosen = _keep(sums + sigma[a, b], lambda t: (tuple(pairs[t].tolist()), (int(ends[t]),)), 2)
     if legs > 2:
         inner = _promising(first.min(axis=0), last.min(axis=0), k, sequences.flat)
         first, last = first[:, inner], last[:, inner]
         table = sequences.table(poses[inner], poses[inner])
-        to_go = []  # of tails (l, n): cost from each pose, and the pose where l ends
-        for a, b in pairs:
-            sums = table[a] + last[b]
-            ends = np.argmin(sums, axis=1)
-            to_go.append(((a, b), np.take_along_axis(sums, ends[:, None], 1)[:, 0] + sigma[a, b], ends))
-        to_go.sort(key=lambda tail: float(np.min(tail[1] + first.min(axis=0))))
-        three: list[Choice] = []
-        four: list[Choice] = []
-        for (a, b), cost, ends in to_go[:TAILS]:
-            for j in range(k):
-                if j == a or not np.isfinite(sigma[j, a]):
-                    continue
-                sums = table[j] + cost
-                nexts = np.argmin(sums, axis=1)
-                longer = np.take_along_axis(sums, nexts[:, None], 1)[:, 0] + sigma[j, a]
-                both = first[j] + cost
-                m = int(np.argmin(both))
-                three.append((float(both[m]) + sigma[j, a], (j, a, b), (inner[m], inner[ends[m]])))
-                for i in range(k if legs > 3 else 0):
-                    if i == j or not np.isfinite(sigma[i, j]):
-                        continue
-                    both = first[i] + longer
-                    m = int(np.argmin(both))
-                    via = (inner[m], inner[nexts[m]], inner[ends[nexts[m]]])
-                    four.append((float(both[m]) + sigma[i, j], (i, j, a, b), via))
-        chosen += _keep(three, 3) + _keep(four, 4)
+        # Of tails (a, b): the cost from each pose, and the pose where a ends.
+        ends, to_go = np.empty((len(pairs), len(inner)), dtype=int), np.empty((len(pairs), len(inner)))
+        for t, (one, two) in enumerate(pairs.tolist()):
+            ends[t], to_go[t] = _least(table[one] + last[two])
+        to_go += sigma[a, b][:, None]
+        order = np.argsort(np.min(to_go + first.min(axis=0), axis=1), kind="stable")[:TAILS]
+        pairs, ends, to_go = pairs[order], ends[order], to_go[order]
+        before = np.where(np.eye(k) > 0, np.inf, sigma)[
+            :, pairs[:, 0]
+        ].T  # of a push and a tail, shape (t, k)
+        at, three = _least(first + to_go[:, None])
+
+        def of_three(n: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+            t, j = divmod(n, k)
+            m = at[t, j]
+            return (j, *pairs[t].tolist()), (int(inner[m]), int(inner[ends[t, m]]))
+
+        chosen += _keep((three + before).ravel(), of_three, 3)
+        if legs > 3:
+            nexts, longer = (
+                np.empty((len(pairs), k, len(inner)), dtype=int),
+                np.empty((len(pairs), k, len(inner))),
+            )
+            sums = np.empty_like(table)
+            for t in range(len(pairs)):
+                nexts[t], longer[t] = _least(np.add(table, to_go[t], out=sums))
+            longer += before[:, :, None]
+            start, four = _least(first[:, None] + longer[:, None])  # (t, i, j)
+            switch = np.where(np.eye(k) > 0, np.inf, sigma)
+
+            def of_four(n: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+                t, i, j = n // (k * k), n // k % k, n % k
+                m = start[t, i, j]
+                then = nexts[t, j, m]
+                via = (int(inner[m]), int(inner[then]), int(inner[ends[t, then]]))
+                return (i, j, *pairs[t].tolist()), via
+
+            chosen += _keep((four + switch).ravel(), of_four, 4)
     seeds = [
         Candidate(
             cost,
@@ -113,39 +125,41 @@ def arc_seeds(sequences: Sequences, rng: np.random.Generator, plain: bool) -> li
 
     fleet, k = sequences.fleet, sequences.fleet.size
     switching = np.ascontiguousarray(fleet.switching, dtype=float)
-    prefixes = max(0 if plain else 1, MOST_TRIPLES // k**3)
-    pushes = rng.integers(k, size=prefixes)
+    count = max(0 if plain else 1, MOST_TRIPLES // k**3)
+    pushes = rng.integers(k, size=count)
     starts = compose(sequences.start, exp(_arcs(sequences, rng, pushes)))
-    ends = sequences.endpoints[
-        np.zeros(prefixes, int)
-        if len(sequences.endpoints) == 1
-        else rng.integers(len(sequences.endpoints), size=prefixes)
-    ]
-    found: list[tuple[float, tuple[int, ...], Array]] = []
-    costs, poses = np.empty(k**3), np.empty((k**3, 2, 3))
-    for prefix in range(-1 if plain else 0, prefixes):
-        first: tuple[int, ...] = () if prefix < 0 else (int(pushes[prefix]),)
-        start = sequences.start if prefix < 0 else starts[prefix]
-        before = (
-            0.0
-            if prefix < 0
-            else sequences.candidate(pushes[[prefix]], np.array([sequences.start, start])).cost
+    ends = sequences.endpoints
+    ends = ends[np.zeros(count, int) if len(ends) == 1 else rng.integers(len(ends), size=count)]
+    if plain:  # first of all those without an arc before
+        starts, ends = (
+            np.concatenate([x[None], y])
+            for x, y in ((sequences.start, starts), (sequences.endpoints[0], ends))
         )
-        end = sequences.endpoints[0] if prefix < 0 else ends[prefix]
-        three_arcs(sequences.cars, switching, start, end, costs, poses)
-        for triple in np.argsort(costs)[: ARC_SEEDS if prefix < 0 else 4]:
-            i, j, h = triple // (k * k), triple // k % k, triple % k
-            cost = before + costs[triple] + (fleet.switching[first[0], i] if first else 0.0)
-            if np.isfinite(cost):
-                via = np.concatenate([starts[[prefix]] if first else starts[:0], poses[triple], [end]])
-                found.append((float(cost), (*first, int(i), int(j), int(h)), via))
+    costs, poses = np.empty((len(starts), k**3)), np.empty((len(starts), k**3, 2, 3))
+    three_arcs(sequences.cars, switching, starts, ends, costs, poses)
+    found: list[tuple[float, int, int]] = []
+    for n, order in enumerate(np.argsort(costs, axis=1)):
+        first = n - int(plain)
+        begun, switched = 0.0, np.zeros(k)
+        if first >= 0:
+            begun = sequences.chain(pushes[[first]], np.array([sequences.start, starts[n]]))[0]
+            switched = switching[pushes[first]]
+        best = order[: ARC_SEEDS if first < 0 else 4]
+        cost = begun + costs[n, best] + switched[best // (k * k)]
+        found += zip(cost.tolist(), [n] * len(best), best.tolist(), strict=True)
     found.sort(key=lambda plan: plan[0])
     seeds: dict[tuple[int, ...], Candidate] = {}
-    for _, sequence, via in found[: 2 * ARC_SEEDS]:
-        seed = sequences.merged(np.array(sequence), np.concatenate([[sequences.start], via]))
-        if seed.key not in seeds:
+    for cost, n, triple in found[: 2 * ARC_SEEDS]:
+        via = (sequences.start, *poses[n, triple], ends[n])
+        sequence = [triple // (k * k), triple // k % k, triple % k]
+        if n >= int(plain):
+            via, sequence = (sequences.start, starts[n], *via[1:]), [int(pushes[n - int(plain)]), *sequence]
+        seed = Candidate(cost, *joined(np.array(sequence), np.array(via)))
+        if np.isfinite(cost) and seed.key not in seeds:
             seeds[seed.key] = seed
-    return list(seeds.values())[:ARC_SEEDS]
+        if len(seeds) == ARC_SEEDS:
+            break
+    return list(seeds.values())
 
 
 def _arcs(sequences: Sequences, rng: np.random.Generator, pushes: np.ndarray) -> Array:
@@ -160,9 +174,10 @@ def _arcs(sequences: Sequences, rng: np.random.Generator, pushes: np.ndarray) ->
     return np.where((motion == 1)[:, None], along, about)
 
 
-def _pairs(sigma: Array) -> list[tuple[int, int]]:
-    k = len(sigma)
-    return [(i, j) for i in range(k) for j in range(k) if i != j and np.isfinite(sigma[i, j])]
+def _least(sums: Array) -> tuple[np.ndarray, Array]:
+    """Where along the last axis it is least, the first of equal ones, and the least."""
+    at = np.argmin(sums, axis=-1)
+    return at, np.take_along_axis(sums, at[..., None], axis=-1)[..., 0]
 
 
 def _promising(first: Array, last: Array, k: int, flat: bool) -> np.ndarray:
@@ -180,5 +195,13 @@ def _promising(first: Array, last: Array, k: int, flat: bool) -> np.ndarray:
     return np.unique(picked)
 
 
-def _keep(found: list[Choice], legs: int) -> list[Choice]:
-    return sorted(found)[: QUOTAS[legs]]
+def _keep(
+    costs: Array, choice: Callable[[int], tuple[tuple[int, ...], tuple[int, ...]]], legs: int
+) -> list[Choice]:
+    """The cheapest, with the pushes and the poses of the pool that a choice is made of."""
+    count = min(QUOTAS[legs], int(np.count_nonzero(np.isfinite(costs))))
+    if count == 0:
+        return []
+    most = np.partition(costs, count - 1)[count - 1]
+    found = [(float(costs[n]), *choice(n)) for n in np.flatnonzero(costs <= most).tolist()]
+    return sorted(found)[:count]

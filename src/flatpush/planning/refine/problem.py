@@ -1,6 +1,7 @@
 """Sequences of pushes with their switch poses: what they cost, and how they are moved to where they cost less."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
@@ -19,6 +20,7 @@ THOROUGH = 4  # repeats of a descent after which a plan also slides to the cheap
 SLIDES = 30
 PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the way to a side of the goal's box
 FOLLOWING = 40  # steps of a descent from a plan nearby
+NOWHERE: Array = np.zeros((0, 3))
 SETTLING: Array = 4e-3 * 0.5 ** np.arange(7.0)  # steps of settle [m, and radii for the angle]
 
 
@@ -27,7 +29,7 @@ class Candidate:
     """A sequence of pushes with its switch poses.
 
     Attributes:
-        cost: of legs and switching.
+        cost: of legs and switching; infinite also where it is not known yet.
         pushes: index of the push of every leg, shape (n,).
         poses: X_WO at the start, at every switch and at the goal, shape (n + 1, 3).
     """
@@ -36,9 +38,9 @@ class Candidate:
     pushes: np.ndarray
     poses: Array
 
-    @property
+    @cached_property
     def key(self) -> tuple[int, ...]:
-        return tuple(int(p) for p in self.pushes)
+        return tuple(self.pushes.tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,7 @@ class Sequences:
     changes: list[list[float]]
     offsets: Array
     flat: bool
+    _works: dict[tuple[int, int], Work] = field(default_factory=dict)
 
     @classmethod
     def of(cls, query: Query, least: float) -> "Sequences":
@@ -94,13 +97,7 @@ class Sequences:
 
     def merged(self, pushes: np.ndarray, poses: Array) -> Candidate:
         """The same, equal neighbours being joined to one leg."""
-        kept = np.ones(
-            len(poses), dtype=bool
-        )  # of two equal pushes the last goes on, from where the first began
-        np.not_equal(pushes[1:], pushes[:-1], out=kept[1:-1])
-        if kept.all():
-            return self.candidate(pushes, np.ascontiguousarray(poses))
-        return self.candidate(pushes[kept[1:]], poses[kept])
+        return self.candidate(*joined(pushes, poses))
 
     def direct(self) -> Candidate:
         """The best single push."""
@@ -122,27 +119,20 @@ class Sequences:
         return self._slid(found, slopes) if repeats >= THOROUGH else found
 
     def _descended(
-        self, found: Candidate, repeats: int, steps: int, end: Array | None = None
+        self, found: Candidate, repeats: int, steps: int, ends: Array = NOWHERE
     ) -> tuple[Candidate, Array]:
-        """The same at a fixed end, or led to another, and what the cost changes when it moves [per m, m, rad]."""
-        pushes, poses, best, slopes = found.pushes, found.poses, np.inf, np.zeros(3)
-        here = poses.copy()
-        for repeat in range(repeats + 1):
-            cost, words = self.chain(pushes, here)
-            if cost == np.inf:
-                break
-            if repeat == 0 and end is not None:
-                here[-1], cost = end, np.inf  # with the words so far: those from the old poses may jump
-            better = cost < best - 1e-7 * cost
-            if cost < best and words["flat"].min() >= self.least * (1.0 - 1e-9):
-                best, poses = cost, here.copy()
-            if repeat == repeats or (best < np.inf and not better):
-                break
-            work = Work.of(words, here, self.least, float(self.fleet.radius[pushes[0]]), self.free)
-            if not descend(work, self.cars, pushes, words, here, steps):
-                break
-            slopes = work.lam[:3]
-        return Candidate(best + self.switching(pushes), pushes, poses), slopes
+        """The same at fixed ends, or led to others, and what the cost changes when the end moves [per m, m, rad]."""
+        pushes, best = found.pushes, found.poses.copy()
+        work = self._work(len(pushes), int(pushes[0]))
+        cost = descend(work, self.cars, pushes, best.copy(), best, ends, repeats, steps)
+        return Candidate(cost + self.switching(pushes), pushes, best), work.lam[:3].copy()
+
+    def _work(self, count: int, first: int) -> Work:
+        """For plans of so many legs that begin with a push."""
+        if (count, first) not in self._works:
+            radius = float(self.fleet.radius[first])
+            self._works[count, first] = Work.of(count, self.least, radius, self.free)
+        return self._works[count, first]
 
     def _slid(self, found: Candidate, slopes: Array) -> Candidate:
         """The sequence with its end moved within the slack to where the cost is least nearby, most often a corner.
@@ -161,7 +151,7 @@ class Sequences:
                 if len(found.pushes) == 1:
                     moved, after = self.candidate(found.pushes, np.array([self.start, end])), slopes
                 else:
-                    moved, after = self._descended(before, 2, 40, end)
+                    moved, after = self._descended(before, 2, 40, np.array([self.start, end]))
                 if moved.cost < found.cost * (1 - 1e-9):
                     found, slopes = moved, after
                     break
@@ -174,13 +164,9 @@ class Sequences:
 
         Its switch poses alone would not do: good plans have few arcs, and those between poses a little off are others.
         """
-        pushes, poses = known.pushes, known.poses.copy()
-        _, words = self.chain(pushes, poses)
-        poses[0], poses[-1, : 2 if self.free else 3] = self.start, self.goal[: 2 if self.free else 3]
-        work = Work.of(words, poses, self.least, float(self.fleet.radius[pushes[0]]), self.free)
-        if not descend(work, self.cars, pushes, words, poses, FOLLOWING):
-            return Candidate(np.inf, pushes, poses)
-        return self.descend(Candidate(np.inf, pushes, poses), 2, FOLLOWING)
+        ends = known.poses[[0, -1]]
+        ends[0], ends[1, : 2 if self.free else 3] = self.start, self.goal[: 2 if self.free else 3]
+        return self._descended(known, 3, FOLLOWING, ends)[0]
 
     def replanning(self, found: Candidate) -> float:
         """Mean cost when every leg but the first starts off its switch pose, over sixteen fixed displacements.
@@ -225,6 +211,15 @@ class Sequences:
         return np.column_stack(
             [poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2] + self.fleet.heading[push]]
         )
+
+
+def joined(pushes: np.ndarray, poses: Array) -> tuple[np.ndarray, Array]:
+    """Pushes and switch poses, equal neighbours being one leg: the last goes on, from where the first began."""
+    kept = np.ones(len(poses), dtype=bool)
+    np.not_equal(pushes[1:], pushes[:-1], out=kept[1:-1])
+    if kept.all():
+        return pushes, np.ascontiguousarray(poses)
+    return pushes[kept[1:]], poses[kept]
 
 
 def _ends(query: Query) -> Array:

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...geometry.pose import Array
 from ..query import Query
 from .pool import arc_seeds, pool_seeds, sample_poses
-from .problem import Candidate, Sequences
+from .problem import Candidate, Sequences, joined
 
 ROUNDS = 3
 POOL = 1600  # poses of a round's pool, for Dubins cars; a third of it for others, whose tables take longer
@@ -216,12 +216,12 @@ def _variations(sequences: Sequences, ranked: list[Candidate], rng: np.random.Ge
         pushes = plan.pushes.copy()
         pushes[rng.integers(n)] = rng.integers(fleet.size)
         if n > 1:
-            found.append(sequences.merged(pushes, plan.poses))
+            found.append(Candidate(np.inf, *joined(pushes, plan.poses)))
         if n < 8:
             i, push = int(rng.integers(n + 1)), int(rng.integers(fleet.size))
             at = plan.poses[i] + 0.15 * np.array([radius, radius, 1.0]) * rng.normal(size=3)
             poses = np.insert(plan.poses, min(max(i, 1), n), at, axis=0)
-            found.append(sequences.merged(np.insert(plan.pushes, i, push), poses))
+            found.append(Candidate(np.inf, *joined(np.insert(plan.pushes, i, push), poses)))
     return [plan for plan in found if np.isfinite(sequences.switching(plan.pushes))]
 
 

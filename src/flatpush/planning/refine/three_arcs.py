@@ -26,17 +26,20 @@ def _fixed(car: Any, letter: int) -> tuple[float, float]:
 
 
 @inner
-def _reach(
-    wx: float, wy: float, ux: float, uy: float, dx: float, dy: float, second: bool
-) -> tuple[float, float]:
-    """A length t with |w - t u| = |d|, u a unit vector, and the angle from d to w - t u; nan where there is none."""
+def _length(wx: float, wy: float, ux: float, uy: float, dx: float, dy: float, second: bool) -> float:
+    """A length t with |w - t u| = |d|, u a unit vector; nan where there is none."""
     along = wx * ux + wy * uy
     square = along * along + dx * dx + dy * dy - wx * wx - wy * wy
     if square < 0.0:
-        return np.nan, np.nan
-    t = along + (-math.sqrt(square) if second else math.sqrt(square))
+        return np.nan
+    return along + (-math.sqrt(square) if second else math.sqrt(square))
+
+
+@inner
+def _bearing(wx: float, wy: float, ux: float, uy: float, dx: float, dy: float, t: float) -> float:
+    """The angle from d to w - t u."""
     x, y = wx - t * ux, wy - t * uy
-    return t, math.atan2(y * dx - x * dy, x * dx + y * dy)
+    return math.atan2(y * dx - x * dy, x * dx + y * dy)
 
 
 @inner
@@ -47,18 +50,11 @@ def _amount(letter: int, value: float) -> float:
     return (value if letter == LEFT else -value) % TURN
 
 
-@kernel(
-    nb.void(
-        CARS, nb.float64[:, ::1], nb.float64[::1], nb.float64[::1], nb.float64[::1], nb.float64[:, :, ::1]
-    )
-)
-def three_arcs(
+@inner
+def _three_arcs(
     cars: Records, switching: Array, start: Array, goal: Array, costs: Array, poses: Array
 ) -> None:
-    """The cheapest plan of one arc each for every three of k pushes i, j, h.
-
-    Fills costs (k³,) and poses (k³, 2, 3) in between; the triple is number (i k + j) k + h.
-    """
+    """From one start to one goal: costs (k³,), poses (k³, 2, 3)."""
     k = len(cars)
     c, s = math.cos(start[2]), math.sin(start[2])
     gx, gy, theta = goal[0] - start[0], goal[1] - start[1], goal[2] - start[2]
@@ -77,15 +73,25 @@ def three_arcs(
             qx, qy = _fixed(cars[j], e)
             rx, ry = _fixed(cars[h], f)
             ex, ey = c * rx - s * ry, s * rx + c * ry
+            # A length, or the middle turn, first: most that cannot be cheaper ends there, before the other angles.
             if e == STRAIGHT:  # X + end r - p = exp(ix) (r - p + y q)
-                y, x = _reach(rx - px, ry - py, -qx, -qy, X + ex - px, Y + ey - py, second)
-                x, z = -x, theta + x
+                y = _length(rx - px, ry - py, -qx, -qy, X + ex - px, Y + ey - py, second)
+                if not (y >= 0.0 and fixed + price(cars[j], e, y) < costs[triple]):
+                    continue
+                x = -_bearing(rx - px, ry - py, -qx, -qy, X + ex - px, Y + ey - py, y)
+                z = theta - x
             elif d == STRAIGHT:  # X + end r - q = x p + exp(iy) (r - q)
-                x, y = _reach(X + ex - qx, Y + ey - qy, px, py, rx - qx, ry - qy, second)
+                x = _length(X + ex - qx, Y + ey - qy, px, py, rx - qx, ry - qy, second)
+                if not (x >= 0.0 and fixed + price(cars[i], d, x) < costs[triple]):
+                    continue
+                y = _bearing(X + ex - qx, Y + ey - qy, px, py, rx - qx, ry - qy, x)
                 z = theta - y
             elif f == STRAIGHT:  # X + end q - p = exp(ix) (q - p) + z end r
                 ox, oy = c * qx - s * qy, s * qx + c * qy
-                z, x = _reach(X + ox - px, Y + oy - py, ex, ey, qx - px, qy - py, second)
+                z = _length(X + ox - px, Y + oy - py, ex, ey, qx - px, qy - py, second)
+                if not (z >= 0.0 and fixed + price(cars[h], f, z) < costs[triple]):
+                    continue
+                x = _bearing(X + ox - px, Y + oy - py, ex, ey, qx - px, qy - py, z)
                 y = theta - x
             else:  # X + end r - p = exp(ix) ((q - p) + exp(iy) (r - q)): a triangle of three known sides
                 wx, wy, ax, ay, bx, by = X + ex - px, Y + ey - py, qx - px, qy - py, rx - qx, ry - qy
@@ -95,15 +101,13 @@ def three_arcs(
                     continue
                 bend = math.acos(cosine / (2.0 * sides))
                 y = (-bend if second else bend) + math.atan2(ay * bx - ax * by, ax * bx + ay * by)
+                if not fixed + price(cars[j], e, _amount(e, y)) < costs[triple]:
+                    continue
                 cy, sy = math.cos(y), math.sin(y)
                 vx, vy = ax + cy * bx - sy * by, ay + sy * bx + cy * by
                 x = math.atan2(wy * vx - wx * vy, wx * vx + wy * vy)
                 z = theta - x - y
-            if not (x == x and y == y and z == z):
-                continue
             x, y, z = _amount(d, x), _amount(e, y), _amount(f, z)
-            if min(x, y, z) < 0.0:
-                continue
             cost = fixed + price(cars[i], d, x) + price(cars[j], e, y) + price(cars[h], f, z)
             if cost < costs[triple]:
                 costs[triple] = cost
@@ -113,3 +117,24 @@ def three_arcs(
                 for n in range(3):
                     poses[triple, 1, n] = poses[triple, 0, n]
                 drive(cars[j], e, y, poses[triple, 1])
+
+
+@kernel(
+    nb.void(
+        CARS,
+        nb.float64[:, ::1],
+        nb.float64[:, ::1],
+        nb.float64[:, ::1],
+        nb.float64[:, ::1],
+        nb.float64[:, :, :, ::1],
+    )
+)
+def three_arcs(
+    cars: Records, switching: Array, starts: Array, goals: Array, costs: Array, poses: Array
+) -> None:
+    """The cheapest plan of one arc each for every three of k pushes i, j, h, from n starts (n, 3) to as many goals.
+
+    Fills costs (n, k³) and poses (n, k³, 2, 3) in between; the triple is number (i k + j) k + h.
+    """
+    for n in range(len(starts)):
+        _three_arcs(cars, switching, starts[n], goals[n], costs[n], poses[n])
