@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 
+from ..contact import Placement
 from ..geometry import relative
 from ..problem import Scene, Segment
 from ..steering.car import Car
@@ -13,7 +15,7 @@ from .options import PushOption
 from .path import Path
 from .rolling import rolling_segment
 from .segments import arcs_of, fingertips, push_segment
-from .transits import Transits
+from .transits import PusherPath, Transits
 
 Moved = TypeVar("Moved", bound=Segment)
 Segments = tuple[Segment, ...]
@@ -38,9 +40,9 @@ def assemble(scene: Scene, transits: Transits, options: Sequence[PushOption], pa
         there = option.placement
         assert there is not None
         if hand is None:
-            segments.append(transits.landing(there).segment(scene.pusher, pose))
+            segments.append(_landing(transits, there).segment(scene.pusher, pose))
         elif number != before or not scene.pusher.turns:
-            crossing = transits.between(hand, there).segment(scene.pusher, pose)
+            crossing = _between(transits, hand, there).segment(scene.pusher, pose)
             segments.append(following(crossing, segments[-1]))
         tips = fingertips(option.push.fingers, option.push.spacing)
         arcs = arcs_of(car_of(option), word, amounts, tips)
@@ -54,9 +56,25 @@ def assemble(scene: Scene, transits: Transits, options: Sequence[PushOption], pa
         stand = relative(pose, push.pusher[-1])
         hand = there if scene.pusher.turns else replace(there, pose=stand, tips=stand[None, :2])
     assert hand is not None
-    away = transits.landing(hand).reversed().segment(scene.pusher, pose)
+    away = _leaving(transits, hand).segment(scene.pusher, pose)
     segments.append(following(away, segments[-1]))
     return tuple(segments)
+
+
+# The ways from the contact of a push and to it are the same in every plan.
+@lru_cache(maxsize=256)
+def _landing(transits: Transits, there: Placement) -> PusherPath:
+    return transits.landing(there)
+
+
+@lru_cache(maxsize=256)
+def _between(transits: Transits, first: Placement, second: Placement) -> PusherPath:
+    return transits.between(first, second)
+
+
+@lru_cache(maxsize=256)
+def _leaving(transits: Transits, hand: Placement) -> PusherPath:
+    return transits.landing(hand).reversed()
 
 
 def following(segment: Moved, before: Segment) -> Moved:

@@ -2,7 +2,7 @@
 
 import heapq
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -51,9 +51,9 @@ class PusherPath:
 
     def duration(self, pusher: Pusher) -> float:
         """Time from rest to rest on every stretch [s]."""
-        return float(sum(law.duration for law in self._laws(pusher)))
+        return float(sum(law.duration for law in self.laws(pusher)))
 
-    def _laws(self, pusher: Pusher) -> list[Trapezoid]:
+    def laws(self, pusher: Pusher) -> list[Trapezoid]:
         """The time law of each stretch: on the table with speed and acceleration, lifted with those of travel.
 
         A fingertip of a turning hand has, beside that of its way, an acceleration towards the middle of the hand,
@@ -78,21 +78,29 @@ class PusherPath:
 
     def segment(self, pusher: Pusher, X_WO: Array) -> TransitSegment:
         """The way beside an object at a pose, timed."""
-        times, poses, heights = [np.zeros(1)], [self.poses[:1]], [self.heights[:1]]
-        clock = 0.0
-        for i, law in enumerate(self._laws(pusher)):
-            turn = abs(float(self.poses[i + 1, 2] - self.poses[i, 2]))
-            steps = [np.sqrt(8 * SAG / law.acceleration)]
-            if turn > 0:
-                steps.append(np.sqrt(8 * SAG_ANGLE * law.length / turn / law.acceleration))
-            t, f = law.samples(float(min(steps)), 1)
-            times.append(clock + t[1:])
-            poses.append(self.poses[i] + f[1:, None] * (self.poses[i + 1] - self.poses[i]))
-            heights.append(self.heights[i] + f[1:] * (self.heights[i + 1] - self.heights[i]))
-            clock += law.duration
-        return TransitSegment(
-            np.concatenate(times), compose(X_WO, np.concatenate(poses)), np.concatenate(heights)
-        )
+        times, poses, heights = _timed(self, pusher)
+        return TransitSegment(times, compose(X_WO, poses), heights)
+
+
+@lru_cache(maxsize=256)  # plans for one object have the same ways beside it
+def _timed(path: PusherPath, pusher: Pusher) -> tuple[Array, Array, Array]:
+    """Times, poses X_OE and heights of the samples of a way."""
+    times, poses, heights = [np.zeros(1)], [path.poses[:1]], [path.heights[:1]]
+    clock = 0.0
+    for i, law in enumerate(path.laws(pusher)):
+        turn = abs(float(path.poses[i + 1, 2] - path.poses[i, 2]))
+        steps = [np.sqrt(8 * SAG / law.acceleration)]
+        if turn > 0:
+            steps.append(np.sqrt(8 * SAG_ANGLE * law.length / turn / law.acceleration))
+        t, f = law.samples(float(min(steps)), 1)
+        times.append(clock + t[1:])
+        poses.append(path.poses[i] + f[1:, None] * (path.poses[i + 1] - path.poses[i]))
+        heights.append(path.heights[i] + f[1:] * (path.heights[i + 1] - path.heights[i]))
+        clock += law.duration
+    found = np.concatenate(times), np.concatenate(poses), np.concatenate(heights)
+    for array in found:
+        array.setflags(write=False)
+    return found
 
 
 def backs_off(outline: Outline, placement: Placement, back: Array, tip_radius: float) -> bool:

@@ -102,7 +102,6 @@ class Trapezoid:
             return np.zeros(1), np.zeros(1)
         T, r = self.duration, self.ramp
         n = max(1, int(np.ceil(r / step)))
-        ramps = np.linspace(0.0, r, n + 1)
         m = max(1, int(np.ceil(count * max(0.0, T - 2 * r) / T)) + 1)
         # A ramp that turns far is divided by the turn as well.
         k = max(n, int(np.ceil(count * 0.5)) if self.length <= self.acceleration * r * r * (1 + 1e-9) else n)
