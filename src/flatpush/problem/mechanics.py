@@ -38,9 +38,7 @@ def contacts_of(scene: Scene, placement: Placement) -> tuple[PointContact, ...]:
 
 def virtual_contact(scene: Scene, placement: Placement) -> PointContact:
     """The contact that a push is planned with, in B: the fingertip's own, or the virtual middle of two (Sec. 4.2)."""
-    return PointContact(
-        placement.virtual_point - scene.object.cof, placement.virtual_normal, scene.object.friction, hook=True
-    )
+    return _virtual(scene.object, placement)
 
 
 def takes_cone(scene: Scene, fingers: int) -> bool:
@@ -125,7 +123,7 @@ def surface_of(thing: Object, model: Model, direction: Array) -> LimitSurface:
     if model == "exact":
         return surface
     if model == "local":
-        return local_ellipsoid(surface, direction)
+        return _local(thing, (float(direction[0]), float(direction[1])))
     if isinstance(surface, Ellipsoid if model == "ellipsoid" else Quartic):
         return surface
     return _fitted(thing, model)
@@ -145,6 +143,14 @@ def divergence_length(thing: Object, contact: PointContact) -> float:
     return r + local_rho(thing, -contact.point / r) / r
 
 
+@lru_cache(maxsize=256)
+def _virtual(thing: Object, placement: Placement) -> PointContact:
+    return PointContact(
+        placement.virtual_point - thing.cof, placement.virtual_normal, thing.friction, hook=True
+    )
+
+
+@lru_cache(maxsize=256)
 def _contacts(thing: Object, placement: Placement) -> tuple[PointContact, ...]:
     return tuple(
         PointContact(point - thing.cof, normal, thing.friction, hook=True)
@@ -222,6 +228,11 @@ def _first_landing(thing: Object, side: Side, tilt: float) -> Landing:
 @lru_cache(maxsize=64)
 def _exact(support: Support) -> LimitSurface:
     return Exact(support.centred())
+
+
+@lru_cache(maxsize=256)
+def _local(thing: Object, direction: tuple[float, float]) -> LimitSurface:
+    return local_ellipsoid(true_surface(thing), np.array(direction))
 
 
 @lru_cache(maxsize=64)

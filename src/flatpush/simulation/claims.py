@@ -1,7 +1,7 @@
 """What a plan claims, computed from its scene and its segments alone."""
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 
 import numpy as np
 
@@ -10,7 +10,16 @@ from ..errors import InputError
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, relative, rotate, shift_twist, velocity_at
 from ..geometry.pose import Array
-from ..problem import CarCentres, Certificate, PushSegment, Scene, Segment, SlideSegment, TransitSegment
+from ..problem import (
+    CarCentres,
+    Certificate,
+    Object,
+    PushSegment,
+    Scene,
+    Segment,
+    SlideSegment,
+    TransitSegment,
+)
 from ..problem.mechanics import (
     cone_motions,
     contact_at,
@@ -49,7 +58,6 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
     pushes = [s for s in segments if isinstance(s, PushSegment)]
     pose = np.asarray(scene.start, dtype=float)
     cars: dict[str, CarCentres] = {}
-    judged: set[tuple[object, ...]] = set()
     motions: list[JudgedMotion] = []
     cost, growth, previous = 0.0, None, None
     slides = any(isinstance(s, SlideSegment) for s in segments)
@@ -72,15 +80,10 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
             cars[segment.push] = (
                 _of_twists(scene, cone_motions(scene, placement, surface))
                 if cone
-                else _centres(scene, contact, surface)
+                else _centres(scene.object, contact, surface, scene.planning.friction_margin)
             )
         for twist, at in _twists(scene, segment, contact):
-            # Margins depend on the direction of a twist, and a push has few of them.
-            what = (segment.push, *np.round(twist / max(float(np.linalg.norm(twist)), 1e-300), 12), *at.point)
-            if what in judged:
-                continue
-            judged.add(what)
-            motions.append(JudgedMotion(placement, surface, cone, at, twist))
+            motions.append(JudgedMotion.of(placement, surface, cone, at, twist))
         cost += sum(arc_costs(scene, segment, cars[segment.push]))
         for arc in segment.arcs:
             pose = compose(pose, exp(arc.duration * arc.twist))
@@ -169,13 +172,14 @@ def _of_twists(scene: Scene, twists: Array) -> CarCentres:
     return CarCentres(_pair(centres[0]), _pair(centres[1]), _pair(twists[1, :2]))
 
 
-def _centres(scene: Scene, contact: PointContact, surface: LimitSurface) -> CarCentres:
+@lru_cache(maxsize=256)
+def _centres(thing: Object, contact: PointContact, surface: LimitSurface, margin: float) -> CarCentres:
     """Turning centres of the margin-shrunk friction cone, and the straight direction, in O."""
-    left, straight, right = steering_forces(contact, surface, scene.planning.friction_margin)
+    left, straight, right = steering_forces(contact, surface, margin)
     centres = []
     for force in (left, right):
         V = surface.twist(contact.wrench(force))
-        centres.append(np.array([-V[1], V[0]]) / V[2] + scene.object.cof)
+        centres.append(np.array([-V[1], V[0]]) / V[2] + thing.cof)
     v = surface.twist(contact.wrench(straight))[:2]
     return CarCentres(_pair(centres[1]), _pair(centres[0]), _pair(v / np.hypot(*v)))
 
