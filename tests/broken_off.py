@@ -1,10 +1,17 @@
 """Runs of a plan that are broken off in each of its phases: by an interrupt, or by the end of what a robot talks to."""
 
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import flatpush as fp
 from flatpush.documents import load_robot_log
 from flatpush.execution import DONE, run
+from tests.waiting import started
 
 PHASES = ("travel", "landing", "push", "lift")
 
@@ -15,6 +22,12 @@ def phase_of(cycle):
         return "push"
     climb = float(cycle.target.twist[2])
     return "lift" if climb > 0 else "landing" if climb < 0 else "travel"
+
+
+def one_push(thing):
+    """A plan of one push of two fingers."""
+    pushes = (fp.Push("south", thing.outline.nearest([0.0, -0.0175]), 2, 0.018),)
+    return fp.plan(fp.Scene(thing, (0.0, -0.03, 0.1), pusher=fp.Pusher(2, 0.018), pushes=pushes))
 
 
 def in_phase(phase, act):
@@ -75,6 +88,45 @@ def ends(robot, plan, folder, phase, kill):
     assert ended.outcome != DONE
     read(log, phase, ended.outcome)
     return len(ended.cycles) - there[4], ended.outcome
+
+
+class BrokenClient(ExitStack):
+    """Runs of a plan by a process of its own that is killed, frozen or late, as often as it is told to be.
+
+    Args:
+        module: the robot's tests, with its robot_at. where: its address. plan, folder: it is written there.
+        base: pose of the table in the robot's base.
+    """
+
+    def __init__(self, module, where, plan, folder, base=None):
+        super().__init__()
+        plan.save(folder / "plan.json")
+        script = Path(__file__).with_name("broken_client.py")
+        words = [
+            sys.executable,
+            script,
+            module,
+            where,
+            folder / "plan.json",
+            script.parents[1],
+            *(base or ()),
+        ]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = self.enter_context(started([*map(str, words)], patience=300, **pipes))
+
+    def breaks(self, phase, how, late=0.0):
+        """Begins a run, and returns when it is broken off in a phase.
+
+        Args:
+            how: "killed", "frozen" or "late". late: by so much [s].
+        """
+        self.process.stdin.write(f"{phase} {how} {late}\n")
+        self.process.stdin.flush()
+        assert self.said() == phase
+
+    def said(self):
+        """The next line, such as the outcome of a run that was late."""
+        return self.process.stdout.readline().strip()
 
 
 def read(log, phase, outcome):

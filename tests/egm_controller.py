@@ -2,7 +2,8 @@
 
 It counts cycles of 4 ms; a cycle ends when its message was answered, or after a while without. After 25 cycles in a
 row without an answer it stops the arm, as a controller's communication time-out does. In a line for each request on
-standard input it says what it saw; its arm is a lag of first order, or the tool of the physics cell.
+standard input it says what it saw, and after "again" it is as at the beginning; its arm is a lag of first order, or the
+tool of the physics cell.
 """
 
 import argparse
@@ -65,8 +66,13 @@ def main():
     connected, stopped, after, farthest, last = False, -1, None, 0.0, arm.pose
     for cycle in range(asked.cycles):
         if select.select([sys.stdin], [], [], 0)[0]:
-            if not sys.stdin.readline():
+            if not (word := sys.stdin.readline()):
                 break
+            if word.strip() == "again":
+                arm, answered, missed, worst = Ideal(asked.home, PERIOD), 0, 0, 0
+                connected, stopped, after, farthest = False, -1, None, 0.0
+                while select.select([line], [], [], 0)[0]:
+                    line.recv(65536)
             told = {
                 "cycles": cycle,
                 "answered": answered,

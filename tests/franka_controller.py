@@ -4,6 +4,7 @@ import argparse
 import json
 import select
 import sys
+from itertools import count
 
 from franky_sim import SimulationServer
 from franky_sim.mujoco_simulator import MujocoSimulator
@@ -19,12 +20,12 @@ def main():
         robot = sim.add_robot(initial_q=asked.joints)
         with SimulationServer(sim, hostname_candidates=[asked.host]) as server:
             print(json.dumps({"host": robot.hostname}), flush=True)
-            while True:
+            for step in count():
                 if select.select([sys.stdin], [], [], 0)[0]:
                     if not sys.stdin.readline():
                         return
                     state = robot.state
-                    print(json.dumps({"q": list(state.q), "dq": list(state.dq)}), flush=True)
+                    print(json.dumps({"step": step, "q": list(state.q), "dq": list(state.dq)}), flush=True)
                 server.run_once(asked.slow)
 
 

@@ -4,7 +4,8 @@ It counts cycles of 8 ms. While a tool is servoed a cycle ends when a command ca
 lasts as long as it says. The uploaded program is not interpreted: what it would do with the registers is done here. It
 says that it is ready (1 in output register 0) whenever it runs, and of a command that is waited for that it is done (2)
 until the command register is cleared. Its watchdog stops it if no command comes for so long. In a line for each request
-on standard input it says what it saw; its arm is a lag of first order, or the tool of the physics cell.
+on standard input it says what it saw, and after "again" it is as at the beginning; its arm is a lag of first order, or
+the tool of the physics cell.
 """
 
 import argparse
@@ -219,8 +220,8 @@ def listen(host, port):
 class Controller:
     """The three ports, whoever is connected to them, and the arm."""
 
-    def __init__(self, host, arm, patience):
-        self.arm, self.patience = arm, patience
+    def __init__(self, host, arm, home, patience):
+        self.arm, self.home, self.patience = arm, home, patience
         self.doors = {listen(host, port): port for port in (DASHBOARD, SCRIPT, RTDE)}
         self.others, self.clients, self.script = {}, {}, b""
 
@@ -236,8 +237,11 @@ class Controller:
                     [*self.doors, *self.others, *self.clients, sys.stdin], [], [], left
                 )[0]:
                     if line is sys.stdin:
-                        if not sys.stdin.readline():
+                        if not (word := sys.stdin.readline()):
                             return
+                        if word.strip() == "again":
+                            self.arm = Arm(Ideal(self.home, PERIOD))
+                            began = 0
                         print(json.dumps(self.arm.told()), flush=True)
                     else:
                         self.take(line)
@@ -289,7 +293,7 @@ def main():
     parser.add_argument("--patience", type=float, default=0.5, help="with a command while it servoes [s]")
     asked = parser.parse_args()
     tool = Cell(asked.plan, asked.start, PERIOD) if asked.plan else Ideal(asked.home, PERIOD)
-    controller = Controller(asked.host, Arm(tool), asked.patience)
+    controller = Controller(asked.host, Arm(tool), asked.home, asked.patience)
     print(json.dumps({"host": asked.host}), flush=True)
     controller.run()
 

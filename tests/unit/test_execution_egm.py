@@ -1,19 +1,22 @@
 """Externally Guided Motion over loopback: a simulated controller in a process of its own, judged by its cycles."""
 
 import math
+import re
+import signal
 import socket
-import sys
 import time
+from functools import partial
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.broken_off import PHASES, ends, interrupts
+from tests.broken_off import PHASES, BrokenClient, ends, interrupts, one_push
 from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
-from tests.waiting import python, started
+from tests.waiting import python
 
 import flatpush as fp
 from flatpush.execution import DONE, OutOfLimits, RobotFault, Target, open_robot, run
@@ -87,42 +90,38 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
 
 @pytest.mark.slow
 def test_interrupts_and_ends_of_the_controller_stop_in_every_phase(three_feet, tmp_path):
-    pushes = (fp.Push("south", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
-    plan = fp.plan(fp.Scene(three_feet, (0.0, -0.03, 0.1), pusher=fp.Pusher(2, 0.018), pushes=pushes))
+    plan = one_push(three_feet)
     with Controller() as controller, robot_at(controller.port) as robot:
         assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
-    for phase in PHASES:
-        with Controller() as controller, robot_at(controller.port, silence=0.5) as robot:
-            more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
-        assert 0 <= more <= 2, outcome
-
-
-CLIENT = """
-import sys
-sys.path.insert(0, sys.argv[2])
-from tests.unit.test_execution_egm import robot_at, swing
-with robot_at(int(sys.argv[1])) as robot:
-    swing(robot, 100000)
-"""
+    for phase, how in product(PHASES, (signal.SIGKILL, signal.SIGSTOP)):
+        with Controller("--patience", 0.05) as controller, robot_at(controller.port, silence=0.5) as robot:
+            act = partial(controller.process.send_signal, how)
+            more, outcome = ends(robot, plan, tmp_path, phase, act)
+            assert 0 <= more <= 2, outcome
+            if how == signal.SIGSTOP:
+                controller.rests_when_it_goes_on(25, "cycles")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", ["killed", "frozen"])
-def test_the_arm_stops_within_25_cycles_when_this_side_is_killed_or_freezes(how):
-    import signal
-
-    with Controller("--patience", 0.2) as controller:
-        words = [sys.executable, "-c", CLIENT, str(controller.port), str(SCRIPT.parents[1])]
-        with started(words) as client:
-            controller.until(lambda told: told["answered"] >= 100)
-            client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-            seen = controller.until(lambda told: told["stopped"] >= 0)
-            time.sleep(0.3)
-            later = controller.asked()
-    # 25 cycles of 4 ms are 100 ms; after them the arm stays where it is.
-    assert seen["worst"] == 25
-    assert later["farthest"] < 1e-9
-    assert later["cycles"] > seen["stopped"]
+def test_the_arm_stops_within_25_cycles_when_this_side_is_killed_frozen_or_late_in_every_phase(
+    three_feet, tmp_path
+):
+    plan, late = one_push(three_feet), 4.0
+    with (
+        Controller("--patience", 0.05) as controller,
+        BrokenClient(__name__, controller.port, plan, tmp_path) as client,
+    ):
+        for how in ("killed", "frozen", "late"):
+            for phase in PHASES:
+                controller.asked("again")
+                client.breaks(phase, how, late)
+                seen = controller.until(lambda told: told["stopped"] >= 0)
+                # 25 cycles of 4 ms are 100 ms; after them the arm stays where it is.
+                assert seen["worst"] == 25, (how, phase)
+                if how == "late":
+                    assert re.search(r"cycle came \d\.\d+ s late|RAPID is not running", client.said()), phase
+                later = controller.until(lambda told, seen=seen: told["cycles"] > seen["stopped"] + 10)
+                assert later["farthest"] < 1e-9, (how, phase)
 
 
 def test_messages_that_have_waited_are_passed_over():

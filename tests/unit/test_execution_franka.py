@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.broken_off import PHASES, ends, interrupts
+from tests.broken_off import PHASES, BrokenClient, ends, interrupts
 from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import after, swing
@@ -122,6 +122,27 @@ def test_interrupts_and_ends_of_the_robot_stop_in_every_phase(triangle, tmp_path
         ):
             more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
         assert 0 <= more <= 11, outcome
+
+
+@pytest.mark.slow
+def test_the_arm_stops_within_100_ms_when_this_side_is_killed_in_every_phase(triangle, tmp_path):
+    """Where it freezes franky-sim goes on with its last velocity, as it counts no missed cycles."""
+    plan, joints = long_push(triangle)
+    with (
+        Controller(joints=joints) as controller,
+        BrokenClient(__name__, controller.host, plan, tmp_path, base=ASIDE) as client,
+    ):
+        for phase in PHASES:
+            client.breaks(phase, "killed")
+            begun = controller.asked()
+            rests, later = (
+                controller.until(lambda told, begun=begun, steps=steps: told["step"] >= begun["step"] + steps)
+                for steps in (100, 300)
+            )
+            # The simulated last joint trembles about where it rests.
+            moved = np.abs(np.subtract(rests["q"], later["q"]))
+            assert moved[:6].max() < 2e-4, phase
+            assert moved[6] < 2e-3, phase
 
 
 @pytest.mark.slow

@@ -5,17 +5,14 @@ import math
 import os
 import signal
 import socket
-import sys
-import time
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
-from tests.broken_off import PHASES, ends, interrupts
+from tests.broken_off import PHASES, BrokenClient, ends, interrupts, one_push
 from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
-from tests.waiting import started
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
@@ -95,41 +92,39 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
 
 @pytest.mark.slow
 def test_interrupts_and_ends_of_the_controller_stop_in_every_phase(three_feet, tmp_path):
-    pushes = (fp.Push("south", three_feet.outline.nearest([0.0, -0.0175]), 2, 0.018),)
-    plan = fp.plan(fp.Scene(three_feet, (0.0, -0.03, 0.1), pusher=fp.Pusher(2, 0.018), pushes=pushes))
+    plan = one_push(three_feet)
     with Controller() as controller, robot_at(controller.host) as robot:
         assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
-    for phase in PHASES:
-        with Controller() as controller, robot_at(controller.host, silence=0.5) as robot:
-            more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
-        assert 0 <= more <= 2, outcome
-
-
-CLIENT = """
-import sys
-sys.path.insert(0, sys.argv[2])
-from tests.unit.test_execution_ur import robot_at, swing
-with robot_at(sys.argv[1]) as robot:
-    swing(robot, 100000)
-"""
+    for phase, how in itertools.product(PHASES, (signal.SIGKILL, signal.SIGSTOP)):
+        with Controller("--patience", 0.05) as controller, robot_at(controller.host, silence=0.5) as robot:
+            act = partial(controller.process.send_signal, how)
+            more, outcome = ends(robot, plan, tmp_path, phase, act)
+            assert 0 <= more <= 3, outcome
+            if how == signal.SIGSTOP:
+                controller.rests_when_it_goes_on(13, "cycle")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", ["killed", "frozen"])
-def test_the_watchdog_stops_the_arm_when_this_side_is_killed_or_freezes(how):
-    with Controller("--patience", 0.2) as controller:
-        words = [sys.executable, "-c", CLIENT, controller.host, str(Path(__file__).parents[2])]
-        with started(words) as client:
-            controller.until(lambda told: told["commands"] >= 100)
-            client.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-            seen = controller.until(lambda told: told["fired"] >= 0)
-            time.sleep(0.3)
-            later = controller.asked()
-    # The watchdog of 10 Hz waits for 12.5 cycles of 8 ms.
-    assert seen["fired"] - seen["heard"] == 13
-    assert later["far"] < 1e-9
-    assert later["cycle"] > seen["fired"]
-    assert not later["playing"]
+def test_the_watchdog_stops_the_arm_when_this_side_is_killed_frozen_or_late_in_every_phase(
+    three_feet, tmp_path
+):
+    plan, late = one_push(three_feet), 4.0
+    with (
+        Controller("--patience", 0.05) as controller,
+        BrokenClient(__name__, controller.host, plan, tmp_path) as client,
+    ):
+        for how in ("killed", "frozen", "late"):
+            for phase in PHASES:
+                controller.asked("again")
+                client.breaks(phase, how, late)
+                seen = controller.until(lambda told: told["fired"] >= 0)
+                # The watchdog of 10 Hz waits for 12.5 cycles of 8 ms.
+                assert seen["fired"] - seen["heard"] == 13, (how, phase)
+                if how == "late":
+                    assert client.said() != DONE
+                later = controller.until(lambda told, seen=seen: told["cycle"] > seen["fired"] + 10)
+                assert later["far"] < 1e-9, (how, phase)
+                assert not later["playing"]
 
 
 def test_where_nobody_or_somebody_else_answers():
