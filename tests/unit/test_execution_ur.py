@@ -44,7 +44,7 @@ def test_every_cycle_has_its_command_and_the_tool_follows():
     assert ended.outcome == DONE
     assert seen["fired"] < 0
     assert seen["commands"] == len(ended.cycles) >= 199
-    # The watchdog is set in the first cycle, which takes as long as the machine needs; then there is one target in each.
+    # The watchdog is set in the first cycle, which takes some; then there is one target in each.
     times = np.array([cycle.time for cycle in ended.cycles])
     assert np.allclose(np.diff(times)[10:], 0.008)
     # The simulated arm lags by 20 ms and a cycle, at 20 mm/s and more in the middle.
