@@ -49,12 +49,13 @@ def test_sections_stand_in_their_order_wherever_they_were_computed(monkeypatch):
     sections = everything(True, None, backwards, told.append)
     assert [done.job.name for _, done in sections] == [section.name for section in SECTIONS]
     assert sorted(done.job.name for done in told) == sorted(section.name for section in SECTIONS)
-    text = page(sections, "this machine", True)
+    by_name = {done.job.name: done for _, done in sections}
+    text = page(by_name, "this machine", True)
     assert re.findall(r'<section id="([\w-]+)">', text) == [section.name for section in SECTIONS]
     assert "&lt;1 mm" in text
     assert "2 &amp; 3" in text
     assert "quick edition" in text
-    assert "quick edition" not in page(sections, "", False)
+    assert "quick edition" not in page(by_name, "", False)
     # Nothing is fetched: every link stays in the page, every picture is in it.
     assert set(re.findall(r'(?:src|href)="([^"]{4})', text)) <= {
         "data",
@@ -77,6 +78,21 @@ def test_an_experiment_that_fails_leaves_the_report_of_the_others(monkeypatch, t
     assert "This experiment failed: ZeroDivisionError: a mistake" in text
     assert 'raise ZeroDivisionError("a mistake")' in unescape(text)  # where, for whoever mends it
     assert text.count("2 &amp; 3") == len(SECTIONS) - 1
+
+
+def test_what_is_done_stays_when_the_rest_is_interrupted(monkeypatch, tmp_path):
+    def interrupted(function, jobs, told):
+        for job in jobs[:3]:
+            told(function(job))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"{HOME}.in_processes", lambda count: interrupted)
+    monkeypatch.setattr(f"{HOME}.compute", found)
+    ended = flatpush("experiment", "all", "-o", tmp_path / "report")
+    assert ended.returncode == 130
+    text = (tmp_path / "report" / "index.html").read_text("utf-8")
+    assert text.count("2 &amp; 3") == 3
+    assert text.count("not computed yet") == len(SECTIONS) - 3
 
 
 def test_a_process_that_dies_ends_its_own_experiment():
@@ -114,7 +130,7 @@ def test_a_section_without_its_data_says_so(name):
     done = compute(Job(name, quick=True))
     assert "--data" in done.finding.missing
     assert not done.finding.rows
-    assert done.finding.missing in page([(SECTIONS[0], done)], "", True)
+    assert done.finding.missing in page({name: done}, "", True)
 
 
 def test_rotation_centres_lie_on_the_line_and_poses_come_back_from_any_point_of_it(tmp_path):

@@ -120,21 +120,23 @@ def _all(
             check_writable(output)
             output.mkdir()
         check_writable(output / REPORT)
-    done, count = 0, os.cpu_count() or 1
+    done: dict[str, Done] = {}
+    count = os.cpu_count() or 1
     where = "on the cluster" if on_cluster or scheduler else f"in {count} processes"
     typer.echo(
         f"{len(SECTIONS)} experiments {where}, the longest first; each is told when it is done", err=True
     )
 
     def told(one: Done) -> None:
-        nonlocal done
-        done += 1
+        done[one.job.name] = one
+        if output is not None:  # what is done stays, whatever becomes of the rest
+            write_atomically(output / REPORT, page(done, _machine(), quick))
         word = f"{one.cpu:.0f} s of CPU"
         if one.finding.missing or one.finding.failed:
             word = (
                 f"left out: {one.finding.missing}" if one.finding.missing else f"failed: {one.finding.failed}"
             )
-        typer.echo(f"{done} of {len(SECTIONS)}: {one.job.name} ({word})", err=True)
+        typer.echo(f"{len(done)} of {len(SECTIONS)}: {one.job.name} ({word})", err=True)
 
     if on_cluster or scheduler is not None:
         from .cluster import cluster
@@ -143,8 +145,6 @@ def _all(
             found = everything(quick, folder, spread, told)
     else:
         found = everything(quick, folder, in_processes(count), told)
-    if output is not None:
-        write_atomically(output / REPORT, page(found, _machine(), quick))
     if as_json:
         print_json(
             {

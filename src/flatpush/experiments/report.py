@@ -1,11 +1,11 @@
 """The report of all experiments as one page: ours beside the paper's, every figure within, nothing to fetch."""
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby
 
-from .everything import Done, Section
+from .everything import SECTIONS, Done, Section
 from .finding import COLUMNS, Finding, Row
 
 STYLE = """
@@ -36,18 +36,19 @@ pre { overflow-x: auto; font-size: .78rem; line-height: 1.35; background: var(--
 MANY = 2  # more figures than this stand side by side
 
 
-def page(sections: Sequence[tuple[Section, Done]], machine: str, quick: bool) -> str:
+def page(found: Mapping[str, Done], machine: str, quick: bool) -> str:
     """The page.
 
     Args:
-        sections: in their order, with what was found.
+        found: in each section, by its name; those that are not there yet are said to be.
         machine: on which, and with which version, for the foot of the page.
         quick: whether fewer runs were made, which the head says.
     """
+    sections = [(section, found.get(section.name)) for section in SECTIONS]
     links = "".join(f'<li><a href="#{s.name}">{escape(s.title)}</a></li>' for s, _ in sections)
     hurried = " This is the quick edition: fewer random runs, and no fits to recorded runs." if quick else ""
     body = "".join(_section(section, done) for section, done in sections)
-    cpu = sum(done.cpu for _, done in sections)
+    cpu = sum(done.cpu for done in found.values())
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -60,8 +61,10 @@ def page(sections: Sequence[tuple[Section, Done]], machine: str, quick: bool) ->
     )
 
 
-def _section(section: Section, done: Done) -> str:
-    found = done.finding
+def _section(section: Section, done: Done | None) -> str:
+    found = (
+        done.finding if done is not None else Finding(missing="This is not computed yet, or was interrupted.")
+    )
     told = found.missing or (found.failed and f"This experiment failed: {found.failed}")
     inside = (f'<p class="missing">{escape(told)}</p>' if told else "") + _content(found)
     return (
