@@ -43,7 +43,8 @@ def test_forces_of_a_facet_pass_through_the_contact():
 def test_left_is_left_as_seen_along_the_inward_normal():
     contact = PointContact([0.0, -1.0], [0.0, 1.0], 0.5)
     left, right = contact.force_edges()
-    assert left[0] < 0 < right[0]
+    np.testing.assert_allclose(left, np.array([-0.5, 1.0]) / np.hypot(0.5, 1.0))  # Eq. 10: |fx| = μ fy
+    np.testing.assert_allclose(right, left * [-1, 1])
     # The force on the left edge turns the object clockwise (contract).
     assert contact.wrench(left)[2] < 0 < contact.wrench(right)[2]
     u_left, u_right = contact.motion_cone(ISOTROPIC)
