@@ -92,7 +92,7 @@ SECTIONS = (
 )
 
 # What takes longest is begun first.
-LONG = ("loops", "replay", "open-loop")
+LONG = ("loops", "sequences", "replay", "open-loop")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from .feedback import objects
 from .finding import Finding, Row, drawn
 from .robot_runs import OFF, PRINTED, STARTS, SWITCH
 
-RUNS, QUICK, SEED = 200, 20, 0
+RUNS, QUICK, SEED = 60, 20, 0  # of each start; a run that the compiled plant leaves undecided takes minutes
 # Friction is anything between these shares of what the plan assumes. Plans hold from 0.8 of it on.
 FRICTION = (0.8, 2.0)
 
