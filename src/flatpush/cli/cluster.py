@@ -13,9 +13,9 @@ PATIENCE = 8.0  # [s] for a scheduler to find workers
 ANSWER = 1.0  # [s] for it to say who it is
 
 
-def check_address(scheduler: str) -> None:
-    """Refuses what cannot be the address of a scheduler, before anything is imported that takes long."""
-    if not scheduler.rpartition(":")[2].rstrip("/").isdigit():
+def check_address(scheduler: str | None) -> None:
+    """Refuses what cannot be the address of a scheduler, if one is given, before anything long is imported."""
+    if scheduler is not None and not scheduler.rpartition(":")[2].rstrip("/").isdigit():
         raise _no_answer(scheduler, "no Dask scheduler answers where there is no port")
 
 
@@ -27,8 +27,7 @@ def cluster(scheduler: str | None) -> Iterator["Mapper"]:
         MissingExtra: without dask.distributed.
         InputError: if no scheduler answers at the address within a few seconds.
     """
-    if scheduler is not None:
-        check_address(scheduler)
+    check_address(scheduler)
     try:
         import distributed
     except ImportError:

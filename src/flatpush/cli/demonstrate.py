@@ -50,10 +50,9 @@ def command(
             raise InputError("a number of 1 or more is needed", key=name, value=value)
     if seed < 0:
         raise InputError("a seed is 0 or more", key="--seed", value=seed)
-    if scheduler is not None:
-        from .cluster import check_address
+    from .cluster import check_address
 
-        check_address(scheduler)
+    check_address(scheduler)
     asked = [load_scene(scene) for scene in scenes]
     try:
         from ..gym.demonstrations import blocks, check_scenes

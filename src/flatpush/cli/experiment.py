@@ -100,10 +100,9 @@ def _all(
     scheduler: str | None,
     as_json: bool,
 ) -> int:
-    if scheduler is not None:
-        from .cluster import check_address
+    from .cluster import check_address
 
-        check_address(scheduler)
+    check_address(scheduler)
     from dataclasses import asdict
 
     from ..documents.atomic import check_writable, write_atomically

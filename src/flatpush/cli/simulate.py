@@ -85,10 +85,9 @@ def command(
         raise InputError("--seed is 0 or more", value=seed)
     if source not in ("arcs", "samples"):
         raise InputError("--source is arcs or samples", value=source)
-    if scheduler is not None:
-        from .cluster import check_address
+    from .cluster import check_address
 
-        check_address(scheduler)
+    check_address(scheduler)
     loaded = load_plan(plan)
     loaded.check_motion()
     from ..problem.scene import MODELS

@@ -4,21 +4,20 @@ A job is a name and what it may read; its finding holds all that the report show
 process or machine, in any order.
 """
 
-import signal
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from ..errors import FlatpushError
+from ..processes import processes
 from .finding import Finding, Row, drawn
 
 
@@ -150,28 +149,18 @@ def compute(job: Job) -> Done:
 
 
 def in_processes(count: int) -> Spread:
-    """Jobs in so many processes of this machine, which end with this one's interest in them."""
+    """Jobs in so many processes of this machine."""
 
     def spread(
         function: Callable[[Job], Done], jobs: Sequence[Job], told: Callable[[Done], None]
     ) -> list[Done]:
-        others = set(active_children())
-        # Ctrl-C reaches every process of a terminal; this one answers for all.
-        with ProcessPoolExecutor(
-            count, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
-        ) as pool:
-            try:
-                futures = {pool.submit(function, job): job for job in jobs}
-                done = {}
-                for future in as_completed(futures):
-                    done[futures[future]] = one = _ended(future, futures[future])
-                    told(one)
-                return [done[job] for job in jobs]
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                for process in set(active_children()) - others:
-                    process.terminate()
-                raise
+        with processes(count) as pool:
+            futures = {pool.submit(function, job): job for job in jobs}
+            done = {}
+            for future in as_completed(futures):
+                done[futures[future]] = one = _ended(future, futures[future])
+                told(one)
+            return [done[job] for job in jobs]
 
     return spread
 

@@ -11,9 +11,7 @@ import itertools
 import os
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
@@ -32,6 +30,7 @@ from ..geometry.pose import Array
 from ..planning import Planner
 from ..planning.options import push_option
 from ..problem import Object, Planning, Push, Pusher, Scene
+from ..processes import processes
 from ..simulation.plant import Plant, PlantState
 
 Law = Literal["horizon", "path", "dfl"]
@@ -318,7 +317,7 @@ def _all(groups: list[list[_Job]], workers: int | None) -> list[list[Ended | Non
     if count <= 1:
         found = [_ended(job) for job in jobs]
     else:
-        with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        with processes(count) as pool:
             found = list(pool.map(_ended, jobs, chunksize=max(1, len(jobs) // (8 * count))))
     sizes = np.cumsum([0, *(len(group) for group in groups)])
     return [found[a:b] for a, b in itertools.pairwise(sizes)]

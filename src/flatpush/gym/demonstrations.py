@@ -2,15 +2,14 @@
 
 import os
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import active_children, get_context
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import Array
 from ..problem import Object, Scene
+from ..processes import processes
 from ..simulation.noise import Noise
 from .policy import PushPolicy
 from .push import Observation, PushEnv, PushVectorEnv
@@ -108,23 +107,16 @@ def blocks(
         while True:
             yield demonstrated(scenes[number % len(scenes)], seed, number)
             number += 1
-    others = set(active_children())
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        try:
-            waiting = [
-                pool.submit(demonstrated, scenes[n % len(scenes)], seed, n)
-                for n in range(first, first + count)
-            ]
-            number = first + count
-            while True:
-                done = waiting.pop(0).result()
-                waiting.append(pool.submit(demonstrated, scenes[number % len(scenes)], seed, number))
-                number += 1
-                yield done
-        finally:  # what runs still is not wanted, and would take minutes
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in set(active_children()) - others:
-                worker.terminate()
+    with processes(count) as pool:
+        waiting = [
+            pool.submit(demonstrated, scenes[n % len(scenes)], seed, n) for n in range(first, first + count)
+        ]
+        number = first + count
+        while True:
+            done = waiting.pop(0).result()
+            waiting.append(pool.submit(demonstrated, scenes[number % len(scenes)], seed, number))
+            number += 1
+            yield done
 
 
 def _demonstrated(job: Job) -> Block:
