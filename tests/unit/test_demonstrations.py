@@ -60,8 +60,11 @@ def read(folder):
     return info, frames, sorted(episodes, key=lambda row: row["episode_index"])
 
 
-def check(folder):
-    """The rules of the layout: indices run on, times follow the rate, episodes and statistics are of their frames."""
+def check(folder, broken=False):
+    """The rules of the layout: indices run on, times follow the rate, episodes and statistics are of their frames.
+
+    Broken off before its last file, info.json, a block has its part in stats.json already: then only sums are compared.
+    """
     info, frames, episodes = read(folder)
     assert info["codebase_version"] == "v3.0"
     assert [e["episode_index"] for e in episodes] == list(range(info["total_episodes"]))
@@ -82,16 +85,22 @@ def check(folder):
             assert len(value) == told["shape"][0] if isinstance(value, list) else told["shape"] == [1]
     assert start == info["total_frames"]
     whole = np.array([frames[k]["action"] for k in range(start)])
+    sums = [whole.min(0), whole.max(0), whole.sum(0), (whole**2).sum(0)]
+    assert np.allclose(info["flatpush"]["sums"]["action"], sums, rtol=1e-5, atol=1e-5)
     told = json.loads((folder / "meta" / "stats.json").read_text())
-    assert told["next.done"]["mean"] == pytest.approx([len(episodes) / start])
     stats = told["action"]
     for name, value in (
-        ("min", whole.min(0)),
-        ("max", whole.max(0)),
-        ("mean", whole.mean(0)),
-        ("std", whole.std(0)),
+        ()
+        if broken
+        else (
+            ("min", whole.min(0)),
+            ("max", whole.max(0)),
+            ("mean", whole.mean(0)),
+            ("std", whole.std(0)),
+        )
     ):
         assert np.allclose(stats[name], value, atol=1e-5)
+    assert broken or told["next.done"]["mean"] == pytest.approx([len(episodes) / start])
     tasks = parquet.read_table(folder / "meta" / "tasks.parquet").to_pylist()
     assert [t["task_index"] for t in tasks] == [0]
     return info, frames, episodes
@@ -203,7 +212,7 @@ def test_what_was_broken_off_is_readable_and_goes_on(tmp_path, how):
         running.send_signal(getattr(signal, how))
         _, said = running.communicate()
     assert running.returncode == (130 if how == "SIGINT" else -signal.SIGKILL), said
-    count = check(info.parents[1])[0]["total_episodes"]
+    count = check(info.parents[1], broken=True)[0]["total_episodes"]
     folder, number = lerobot.LeRobotFolder(tmp_path / "whole", 3), 0
     while folder.episodes < count + 3:
         folder.add(quick(SCENE, 3, number), count + 3 - folder.episodes)
