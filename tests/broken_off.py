@@ -1,8 +1,11 @@
 """Runs of a plan that are broken off in each of its phases: by an interrupt, or by the end of what a robot talks to."""
 
+import signal
 import subprocess
 import sys
 from contextlib import ExitStack
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +91,25 @@ def ends(robot, plan, folder, phase, kill):
     assert ended.outcome != DONE
     read(log, phase, ended.outcome)
     return len(ended.cycles) - there[4], ended.outcome
+
+
+def ends_in_every_phase(controlled, robot_on, plan, folder, most, cycles, name):
+    """Ctrl-C on this side, and the controller killed or frozen, in every phase of a plan.
+
+    Args:
+        controlled: a controller of given options, and robot_on: a robot on it, to be entered.
+        most: cycles that a run goes on without its controller. cycles, name: after which the arm of one that was frozen
+            rests, by the counter of that name.
+    """
+    with controlled() as controller, robot_on(controller) as robot:
+        assert interrupts(robot, plan, folder, 0.003) == PHASES
+    for phase, how in product(PHASES, (signal.SIGKILL, signal.SIGSTOP)):
+        with controlled("--patience", 0.05) as controller, robot_on(controller, silence=0.5) as robot:
+            act = partial(controller.process.send_signal, how)
+            more, outcome = ends(robot, plan, folder, phase, act)
+            assert 0 <= more <= most, outcome
+            if how == signal.SIGSTOP:
+                controller.rests_when_it_goes_on(cycles, name)
 
 
 class BrokenClient(ExitStack):

@@ -5,11 +5,10 @@ import math
 import os
 import signal
 import socket
-from functools import partial
 
 import numpy as np
 import pytest
-from tests.broken_off import PHASES, BrokenClient, ends, interrupts, one_push
+from tests.broken_off import PHASES, BrokenClient, ends_in_every_phase, one_push
 from tests.extras import extra
 from tests.simulated_controller import SimulatedController, conforms
 from tests.simulated_swing import swing
@@ -91,16 +90,10 @@ def test_a_controller_that_is_killed_or_freezes_ends_the_run():
 
 @pytest.mark.slow
 def test_interrupts_and_ends_of_the_controller_stop_in_every_phase(three_feet, tmp_path):
-    plan = one_push(three_feet)
-    with Controller() as controller, robot_at(controller.host) as robot:
-        assert interrupts(robot, plan, tmp_path, 0.003) == PHASES
-    for phase, how in itertools.product(PHASES, (signal.SIGKILL, signal.SIGSTOP)):
-        with Controller("--patience", 0.05) as controller, robot_at(controller.host, silence=0.5) as robot:
-            act = partial(controller.process.send_signal, how)
-            more, outcome = ends(robot, plan, tmp_path, phase, act)
-            assert 0 <= more <= 3, outcome
-            if how == signal.SIGSTOP:
-                controller.rests_when_it_goes_on(13, "cycle")
+    def robot_on(controller, **more):
+        return robot_at(controller.host, **more)
+
+    ends_in_every_phase(Controller, robot_on, one_push(three_feet), tmp_path, 3, 13, "cycle")
 
 
 @pytest.mark.slow
