@@ -175,8 +175,9 @@ def test_the_band_in_the_figure_is_the_tube(plan):
 @pytest.mark.parametrize(("support", "friction"), [(None, (0.4, 0.12)), ("uniform", (0.4, 0.2))])
 def test_one_landing_leaves_no_more_than_is_said(support, friction):
     """In the plant, with much and little friction of the fingers: only an offset along the side is left, within the
-    bound, and corners of the region come near to it, so that it is not much too wide. (It goes on straight: with less
-    friction than was planned for it would slip in turns.)"""
+    bound, and corners of the region come near to it, so that it is not much too wide, but for what the hand goes along
+    the side on its way: that is bounded by the longest way of all tables, and this one's is shorter. (It goes on
+    straight: with less friction than was planned for it would slip in turns.)"""
     plan = pressed(scene_of(support=support), [(0, 1, 0.02)])
     things = [replace(plan.scene.object, uncertainty=None, friction=mu) for mu in friction]
     begins = starts(plan.scene, 40, np.random.default_rng(3))
@@ -186,8 +187,9 @@ def test_one_landing_leaves_no_more_than_is_said(support, friction):
     side = side_of(plan.scene, placement_of(plan.scene, plan.scene.pushes[0]))
     assert np.max(np.abs(errors[:, 2])) <= 1e-6
     assert np.max(np.abs(errors[:, :2] @ side.normal)) <= 1e-6
-    worst, bound = np.max(np.abs(errors[:, :2] @ side.along)), plan.certificate.tube[0].offset
-    assert 0.8 * bound <= worst <= bound
+    worst, (part,) = np.max(np.abs(errors[:, :2] @ side.along)), plan.certificate.tube
+    along = part.travel * abs(np.tan(side.tilt(plan.pushes[0].arcs[0].twist[:2])))
+    assert 0.88 * (part.offset - along) <= worst <= part.offset
 
 
 @pytest.mark.slow
