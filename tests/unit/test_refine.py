@@ -1,6 +1,6 @@
 """Refined plans of many pushes: legs, the descent, seeds, and what holds for every answer."""
 
-from itertools import islice, product
+from itertools import islice, pairwise, product
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from flatpush.planning.query import Query
 from flatpush.planning.refine import improvements, refine
 from flatpush.planning.refine.pool import arc_seeds, pool_seeds, sample_poses
 from flatpush.planning.refine.problem import Sequences
+from flatpush.planning.refine.three_arcs import three_arcs
 from flatpush.steering import three_twist
 from flatpush.steering.fleet import Fleet
 from flatpush.steering.six_words import MOST_WORDS, WORD, every_word
@@ -61,6 +62,16 @@ def plain_leg(fleet, push, start, goal):
         return plain_time(fleet.rates[push, k] * amount, fleet.speeds[push, k], fleet.accelerations[push, k])
 
     return min(sum(cost(k, p) for k, p in zip(w.word, w.parameters, strict=True)) for w in words)
+
+
+def one_arc(fleet, push, start, goal):
+    """The cost of the one arc of a push that leads from a pose to another; inf if none does."""
+    costs = [np.inf]
+    for word in three_twist.words(fleet.left[push], fleet.right[push], fleet.direction[push], start, goal):
+        arcs = [(k, p) for k, p in zip(word.word, word.parameters, strict=True) if p > 1e-6]
+        if len(arcs) <= 1:
+            costs.append(sum(fleet.rates[push, SENSE[k]] * p for k, p in arcs))
+    return min(costs)
 
 
 def plain_cost(fleet, plan):
@@ -190,6 +201,25 @@ def test_three_arcs_of_three_pushes_are_found_exactly(motions):
         seeds = arc_seeds(Sequences.of(Query(fleet, pose, GOAL), 0.0), rng, True)
         assert seeds[0].cost <= total * (1 + 1e-9)
         assert refine(Query(fleet, pose, GOAL), rounds=1).cost <= total * (1 + 1e-9)
+
+
+def test_three_arcs_cost_what_the_plain_words_between_their_poses_cost():
+    """Each of the three legs is one arc by the plain words, and costs what that one costs."""
+    fleet, rng = KINDS["general"], np.random.default_rng(6)
+    starts, goals = random_poses(rng, 40), random_poses(rng, 40)
+    sequences = Sequences.of(Query(fleet, GOAL, GOAL), 0.0)
+    costs, poses = np.empty((40, 27)), np.empty((40, 27, 2, 3))
+    three_arcs(sequences.cars, fleet.switching, starts, goals, costs, poses)
+    checked = 0
+    for start, goal, cost, between in zip(starts, goals, costs, poses, strict=True):
+        for pushes in ((0, 1, 2), (1, 0, 2), (2, 1, 0)):
+            triple = (pushes[0] * 3 + pushes[1]) * 3 + pushes[2]
+            if np.isfinite(cost[triple]):
+                legs = zip(pushes, pairwise([start, *between[triple], goal]), strict=True)
+                own = sum(one_arc(fleet, push, *ends) for push, ends in legs)
+                assert own + 2 * 0.02 == pytest.approx(cost[triple], rel=1e-6)
+                checked += 1
+    assert checked > 50
 
 
 def test_legs_are_as_long_as_asked():
