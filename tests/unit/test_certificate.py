@@ -125,6 +125,62 @@ def test_cost_duration_and_goal_error_are_those_of_the_arcs():
     assert plan.certificate.duration == pytest.approx(sum(segment.times[-1] for segment in plan.segments))
 
 
+@pytest.mark.parametrize("kind", ["rim", "feet"])
+def test_one_finger_keeps_its_friction_margin_on_the_exact_table(kind):
+    """Among all forces at the contact the one that balances the table's friction, summed over points that press on it;
+    and with less friction than is said to be enough the finger slides, with a little more it does not."""
+    feet = np.array([(-0.018, -0.012), (0.02, -0.01), (0.0, 0.014)])
+    if kind == "rim":
+        ends = np.array(BLOCK)
+        lengths = np.linalg.norm(np.roll(ends, -1, axis=0) - ends, axis=1)
+        share = (np.arange(20_000) + 0.5)[:, None] / 20_000
+        points = np.concatenate(
+            [a + share * (b - a) for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)]
+        )
+        loads = np.repeat(lengths / lengths.sum() / 20_000, 20_000)
+    else:
+        points, loads = feet, np.full(3, 1 / 3)
+    thing = fp.Object(BLOCK, "outline" if kind == "rim" else fp.Support.points(feet), friction=MU)
+    pushes = (fp.Push("below", thing.outline.at(0, 0.5)),)
+    planning = fp.Planning(friction_margin=0.2, iterations=1)
+    plan = fp.plan(fp.Scene(thing, (0.01, -0.12, 0.3), pushes=pushes, planning=planning))
+    contact, angles = np.array([0.0, -R]), np.linspace(-np.arctan(MU), np.arctan(MU), 400_001)
+    forces, needed = np.stack([np.sin(angles), np.cos(angles)], axis=1), []
+    for arc in plan.pushes[0].arcs:
+        vx, vy, w = arc.twist
+        v = np.stack([vx - w * points[:, 1], vy + w * points[:, 0]], axis=1)
+        friction = loads[:, None] * v / np.linalg.norm(v, axis=1)[:, None]
+        arms = points - contact
+        torque = np.sum(arms[:, 0] * friction[:, 1] - arms[:, 1] * friction[:, 0])
+        assert abs(torque) < 1e-7  # about the contact, whose force has none [m]
+        size = forces @ friction.sum(axis=0)
+        off = np.linalg.norm(size[:, None] * forces - friction.sum(axis=0), axis=1)
+        needed.append(np.tan(abs(angles[np.argmin(off)])))
+    margin = plan.certificate.friction_margin
+    assert margin == pytest.approx(1 - max(needed) / MU, abs=5e-6)  # of the angles
+    assert margin == pytest.approx(0.2, abs=1e-9)
+    for part, sticks in ((1.002, True), (0.98, False)):
+        slippery = replace(thing, friction=part * (1 - margin) * MU)
+        run = fp.simulate(replace(plan, scene=replace(plan.scene, object=slippery)))
+        assert any(mode.startswith("sliding") for mode in run.modes) is not sticks
+
+
+def test_the_cars_turn_about_the_centres_of_the_ellipsoid():
+    """At the edges of 0.8 μ: V = A F with F = (t, 1, R t), about (-vy, vx) / ω; and so do the arcs that are driven."""
+    plan = one_finger(0.2)
+    rho, car = A / B, plan.certificate.cars["below"]
+    assert car.left_centre == pytest.approx((-rho / (R * 0.8 * MU), rho / R), abs=1e-12)
+    assert car.right_centre == pytest.approx((rho / (R * 0.8 * MU), rho / R), abs=1e-12)
+    assert car.straight == pytest.approx((0.0, 1.0), abs=1e-12)
+    for arc in plan.pushes[0].arcs:
+        vx, vy, w = arc.twist
+        centre = {"left": car.left_centre, "right": car.right_centre}.get(arc.turn)
+        if centre is None:
+            assert (vx, w) == pytest.approx((0.0, 0.0), abs=1e-12)
+        else:
+            assert (-vy / w, vx / w) == pytest.approx(centre, abs=1e-12)
+
+
 def pair(rng):
     turns = rng.uniform(-0.5, 0.5, 2) * rng.integers(0, 2)
     places = [np.array([x, -0.015]) for x in (0.009, -0.009)] + rng.uniform(-0.01, 0.01, 2)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import yaml
 from tests.extras import extra
+from tests.listed import listed
 
 from flatpush.documents import load_scene
 from flatpush.errors import InputError
 from flatpush.geometry import Outline, cross
 
 FOLDER = Path(__file__).parents[1] / "data" / "drawings"
-CASES = yaml.safe_load((FOLDER / "cases.yaml").read_text(encoding="utf-8"))
+CASES = listed(FOLDER / "cases.yaml")
 # Of the size, twice: curves are polygons within this of what is drawn.
 FLATNESS = 1e-4
 

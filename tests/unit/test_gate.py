@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from tests.listed import listed
 
 import flatpush as fp
 from flatpush.documents import parse_plan, plan_document
 from flatpush.errors import InputError
 from flatpush.problem import TransitSegment
 
-EDITS = yaml.safe_load((Path(__file__).parents[1] / "data" / "plan_edits.yaml").read_text())
+EDITS = listed(Path(__file__).parents[1] / "data" / "plan_edits.yaml")
 BLOCK = [(-0.025, -0.0175), (0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175)]
 
 
