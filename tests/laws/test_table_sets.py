@@ -143,6 +143,17 @@ def test_no_table_of_the_set_slips_where_it_is_proved(name):
         assert np.min(cone.depth(loads @ rows)) >= -1e-6
 
 
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_the_greatest_mean_is_that_of_the_worst_loads_and_no_less_on_few_patches(name):
+    """Of a linear function, whose mean over a patch is its value in the middle: loads differ within a patch as well."""
+    fine, coarse = (TableSet.of(SUPPORTS[name], 0.3, count) for count in (4_000, 12))
+    n, none = np.array([0.6, 0.8]), np.zeros(1)
+    most = float(vertex(fine.weights, 0.3, fine.points @ n) @ fine.points @ n)
+    assert float(fine.most(fine.points @ n, none, none)) == pytest.approx(most, rel=1e-9)
+    said = float(coarse.most(coarse.points @ n, coarse.reach, np.zeros_like(coarse.reach)))
+    assert said == pytest.approx(most, rel=1e-9) if name == "feet" else most < said < 1.4 * most
+
+
 @pytest.mark.parametrize("name", ["face", "rim", "disc", "ring"])
 def test_within_a_patch_powers_leave_their_bounds_nowhere(name):
     """Patches are sampled through and through; the bounds hold for each, and are not idle."""

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 import flatpush as fp
-from flatpush.contact.landing import Landing, _turning_distance, carried, landing
+from flatpush.contact.landing import Landing, _moments, _turning_distance, carried, landing
 from flatpush.contact.table_set import TableSet
 from flatpush.documents import load_plan
 from flatpush.documents.scene_reader import parse_scene
@@ -107,24 +107,57 @@ def test_a_larger_region_leaves_more_and_never_less_than_the_angle_at_the_depth(
     assert np.all(np.diff(found, axis=0) > 0)
 
 
-def test_the_turning_distance_is_that_of_a_finger_that_sticks():
-    """On one table of three feet, against the root of the moment about the finger, found by brute force."""
+def moment_of(tables, z, c):
+    """The greatest Σ w z · (z - c) / |z - c| of loads at points z (n, 2)."""
+    q = np.sum(z * (z - c), axis=1) / np.linalg.norm(z - c, axis=1)
+    order, loads = np.argsort(q), tables.weights
+    middle = q[order[np.searchsorted(np.cumsum(loads[order]), 0.5)]]
+    return loads @ (q + tables.share * np.abs(q - middle))
+
+
+@pytest.mark.parametrize("step", [0.5, 1e-4])
+@pytest.mark.parametrize(("kind", "patches"), [("feet", 0), ("outline", 12), ("uniform", 12)])
+def test_a_moment_is_bounded_between_directions_between_places_and_within_patches(kind, patches, step):
+    """Directions half a radian apart, touched points 4 mm, against all that lies between; then patches alone."""
+    support = scene_of(support=None if kind == "feet" else kind).object.support
+    fine, coarse = TableSet.of(support, 0.3, 1_000), TableSet.of(support, 0.3, patches)
+    wander = 0.008 * step
+    touched = np.array([-0.008, -0.018]) + wander * np.array([(-1, 0), (0, 0), (1, 0)])
+    for first, Y in product(np.arange(-0.1, 1.5, 0.5), np.geomspace(0.005, 1.0, 12)):
+        turns = np.array([first, first + step])
+        e = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        most = np.max(_moments(coarse, coarse.points - touched[:, None], e, step, wander, Y))
+        for turn, aside in product(first + step * np.array([0.05, 0.3, 0.5, 0.8]), np.linspace(-1, 1, 7)):
+            z = fine.points - (touched[1] + (aside * wander, 0.0))
+            assert moment_of(fine, z, Y * np.array([np.cos(turn), np.sin(turn)])) <= most + 1e-12
+
+
+@pytest.mark.parametrize("wander", [0.0, 0.0015])
+@pytest.mark.parametrize(
+    ("kind", "share", "patches", "above"),
+    [("feet", 0.0, 0, 1.05), ("feet", 0.3, 0, 1.05), ("outline", 0.3, 40, 1.1), ("uniform", 0.3, 40, 1.3)],
+)
+def test_the_turning_distance_is_that_of_a_finger_that_sticks(kind, share, patches, above, wander):
+    """Against the root of the moment about the finger by brute force, on the worst loads of points that press: it is
+    never nearer, whatever the direction and wherever the touched point has got to, and little further."""
     feet = fp.Support.points([(-0.02, -0.01), (0.02, -0.01), (0.0, 0.02)])
-    scene = scene_of(support=feet)
-    side, tables = side_and_tables(scene, 0.0)
-    found = _turning_distance(tables, scene.object.cof, side, 0.0, 0.0)
+    scene = scene_of(support=feet if kind == "feet" else kind)
+    side, _ = side_and_tables(scene)
+    cof = scene.object.cof
+    found = _turning_distance(TableSet.of(scene.object.support, share, patches), cof, side, 0.0, wander)
+    fine = TableSet.of(scene.object.support, share, 3_000)
     worst = 0.0
-    for place in side.fingers:
-        p = place * side.along - side.depth * side.normal
-        z = feet.feet[0] - p
+    for place, aside in product(side.fingers, (-wander, -0.6 * wander, 0.3 * wander, wander)):
+        z = fine.points + cof - (place + aside) * side.along + side.depth * side.normal
         inward = -np.sign(place) * side.along
-        for lift in np.linspace(0, np.pi / 2, 31):
+        for lift in np.linspace(0, np.pi / 2, 37):
             e = np.cos(lift) * inward + np.sin(lift) * side.normal
-            Y = np.linspace(1e-4, 0.4, 4_000)[:, None, None]
-            away = z - Y * e
-            moment = np.sum(np.sum(z * away, axis=2) / np.linalg.norm(away, axis=2), axis=1)
-            worst = max(worst, float(Y[np.flatnonzero(moment > 0)[-1], 0, 0]))
-    assert worst == pytest.approx(found, rel=2e-3)
+            low, high = worst, 1.0
+            while high - low > 1e-5:
+                half = 0.5 * (low + high)
+                low, high = (half, high) if moment_of(fine, z, half * e) > 0 else (low, half)
+            worst = low
+    assert worst <= found <= above * worst
 
 
 def test_a_plan_ends_at_the_goal_from_every_start(plan, tmp_path):

@@ -26,15 +26,16 @@ from ..errors import InputError
 from ..geometry import Outline, cross, perpendicular
 from ..geometry.pose import Array
 from .placement import Placement
-from .table_set import PARALLEL, TableSet
+from .table_set import PARALLEL, SWING, TableSet
 
 # Directions from the touched point to the turning centre that are looked at, from along the side to square to it.
-WAYS = 7
-# A turning centre further off than so many radii of the support: the object does not turn towards the other finger.
-FAR = 200.0
+WAYS = 33
+# That centre is sought between these distances, by the support's radius; further off the object does not turn towards
+# the other finger.
+NEAR, FAR = 0.01, 200.0
 BETWEEN = "Fingers further apart, a push nearer to the middle or a smaller region would do."
-# Halvings of the range of distances of that centre.
-HALVINGS = 20
+# Halvings of the range of distances of that centre, as ratios: to a thousandth.
+HALVINGS = 14
 
 
 @dataclass(frozen=True)
@@ -209,36 +210,70 @@ def carried(side: Side, along: Array, offset: float, tilt: float) -> Landing:
 
 
 def _turning_distance(tables: TableSet, cof: Array, side: Side, lean: float, wander: float) -> float:
-    """The furthest that a turning centre is from the finger that pushes alone, on any table [m]."""
+    """The furthest that a turning centre is from the finger that pushes alone, on any table [m].
+
+    For all directions from along the side to square to it, and all places of the touched point up to where it wanders:
+    some of both are looked at, and what the moment may be more between is added.
+    """
     farthest = 0.0
     middle = np.mean(side.fingers)
+    lifts = np.linspace(-lean, 0.5 * np.pi, WAYS)[:, None]
     for place in side.fingers:
         inward = 1.0 if place < middle else -1.0
-        p = (place + inward * wander) * side.along - side.depth * side.normal
-        z = tables.points + cof - p
-        for lift in np.linspace(-lean, 0.5 * np.pi, WAYS):
-            e = np.cos(lift) * inward * side.along + np.sin(lift) * side.normal
-            low, high = 0.0, FAR * tables.radius
-            if _moment(tables, z, e, high) >= 0:
-                raise InputError(
-                    "the centre of friction does not lie between the fingers for every table and start, so that one"
-                    " finger alone need not turn the object against the other",
-                    key="object.uncertainty.start",
-                    hint=BETWEEN,
-                )
-            for _ in range(HALVINGS):
-                half = 0.5 * (low + high)
-                low, high = (half, high) if _moment(tables, z, e, half) >= 0 else (low, half)
-            farthest = max(farthest, high)
+        e = np.cos(lifts) * inward * side.along + np.sin(lifts) * side.normal
+        places = place + wander * np.array([-1.0, 0.0, 1.0] if wander > 0 else [0.0])
+        p = places[:, None] * side.along - side.depth * side.normal
+        z = tables.points + cof - p[:, None]
+        low, high = NEAR * tables.radius, FAR * tables.radius
+        step = float(lifts[1, 0] - lifts[0, 0])
+        if np.any(_moments(tables, z, e, step, wander, high) >= 0):
+            raise InputError(
+                "the centre of friction does not lie between the fingers for every table and start, so that one"
+                " finger alone need not turn the object against the other",
+                key="object.uncertainty.start",
+                hint=BETWEEN,
+            )
+        for _ in range(HALVINGS):
+            half = float(np.sqrt(low * high))
+            over = _moments(tables, z, e, step, wander, half) >= 0
+            if not np.any(over):
+                high = half
+                continue
+            low, beside = half, over.copy()  # between two directions of which neither is, nothing is further
+            beside[1:] |= over[:-1]
+            beside[:-1] |= over[1:]
+            e = e[beside]
+        farthest = max(farthest, high)
     return farthest
 
 
-def _moment(tables: TableSet, z: Array, e: Array, distance: float) -> float:
-    """The greatest Σ w z · (z - c) / |z - c| of the set, c = distance · e; of patches, an upper bound."""
-    away = z - distance * e
-    apart = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
-    h = tables.reach
+def _moments(tables: TableSet, z: Array, e: Array, step: float, wander: float, distance: float) -> Array:
+    """Σ w q, q = z · (z - c) / |z - c|, for centres c = Y e, at most, shape (m,).
+
+    Of each direction the greatest over the set and all touched points; between two directions it is never more than the
+    greater of theirs.
+
+    Args:
+        z: of the loads from touched points that are `wander` apart, shape (k, n, 2).
+        e: unit vectors, shape (m, 2); neighbours are a step apart [rad].
+        distance: Y [m].
+    """
+    c = distance * e[:, None, None]
+    apart = np.maximum(np.linalg.norm(z - c, axis=-1), 1e-12)
+    unit = (z - c) / apart[..., None]
+    # q = |z - c| + c · û, û of z - c; in a patch |∇q| ≤ 1 + Y/d and |∇²q| ≤ 1/d + SWING Y/d², d = |z - c|.
+    h, along, across = tables.reach, tables.along, perpendicular(unit)
     near = np.maximum(apart - h, 1e-12)
-    # |∇| ≤ 1 + Y/d and |∇²| ≤ 1/d + 3 Y/d², d being the distance from the centre.
-    bound = np.minimum(h * (1 + distance / near), 0.5 * h**2 * (1 / near + 3 * distance / near**2))
-    return tables.most(np.sum(z * away, axis=1) / apart + np.where(h > 0, bound, 0.0))
+    second = 0.5 * h**2 * (1 / near + SWING * distance / near**2)
+    pull = np.sum(c * across, axis=-1) / apart  # ∇q = û + pull · across
+    straight = np.abs(np.sum(unit * along, axis=-1) + pull * np.sum(across * along, axis=-1))
+    rate = np.where(np.any(along != 0, axis=-1), straight, np.hypot(1.0, pull))
+    first = np.minimum(h * (1 + distance / near), h * rate + second)
+    # Along the directions q' = Y² sin 2β / (2d), β the angle at c from p to r, so that |q''| ≤ √5/2 |z| Y²/d²; along
+    # the points |q''| ≤ 2/d + SWING |z|/d²; at all |q| ≤ |z|.
+    size = np.linalg.norm(z, axis=-1) + h + wander
+    near = np.maximum(near - distance * step - wander, 1e-12)
+    bent = 0.5 * np.sqrt(5) * size * (distance * step / near) ** 2
+    bent += (2 / near + SWING * size / near**2) * wander**2
+    q = np.sum(z * unit, axis=-1) + np.minimum(bent / 8, 2 * size)
+    return np.asarray(np.max(tables.most(q, first, second), axis=1))

@@ -170,10 +170,14 @@ class TableSet:
         loads = self.weights * (1 - self.share * _extreme(g[0, 0], self.weights))
         return WorstTable(float(heights[face]), loads, n, self.loaded(cone, V, n, loads))
 
-    def most(self, values: Array) -> float:
-        """The greatest Σ w v over the loads of the set, of a value v for each point (n,)."""
-        weights = self.weights * (1 - self.share * _extreme(-values, self.weights))
-        return float(weights @ values)
+    def most(self, values: Array, first: Array, second: Array) -> Array:
+        """The greatest ∫ v dw over the loads of the set, of v at each point (..., n), shape (...); no less of patches.
+
+        Args:
+            first, second: bounds of |v - v(p)| within a patch, and of its mean over it.
+        """
+        nominal = (values + np.minimum(first, second)) @ self.weights
+        return np.asarray(nominal + self.share * self._spread(values, first, second))
 
     def largest(self, cone: WrenchCone, twist: ArrayLike) -> Array:
         """The largest share, at most 1, by which loads may differ so that twists are kept, shape (...).
@@ -245,15 +249,18 @@ class TableSet:
         else:
             nominal = g @ self.weights
             W = self._wrenches(lever, V)
-        middle = _weighted_median(g, self.weights)
-        off = np.abs(g - middle[..., None])
-        spread = (off + np.where(off > first, np.minimum(first, second), first)) @ self.weights
+        spread = self._spread(g, first, second)
         # By the nominal wrench's size, as a depth is.
         size = np.maximum(np.linalg.norm(W, axis=1), 1e-300)
         if self.step > 0:
             between = self._between(lever, V, faces) @ self.weights
             nominal, spread = nominal - between, spread + between
         return nominal, spread, size
+
+    def _spread(self, g: Array, first: Array, second: Array) -> Array:
+        """min ∫ |g - m| dw̄ over m, shape (...), of g at each point (..., n); of patches, not less than that."""
+        off = np.abs(g - _weighted_median(g, self.weights)[..., None])
+        return np.asarray((off + np.where(off > first, np.minimum(first, second), first)) @ self.weights)
 
     def _between(self, lever: float, V: Array, faces: Array) -> Array:
         """By how much g may fall short of the line between its values here and a step aside, shape (m, k, n).
