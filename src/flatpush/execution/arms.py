@@ -29,7 +29,8 @@ class Arm:
         aside: by which that plane lies beside the first axis, to its left [m].
         reach, drop: from the wrist's axis to the flange, away from the first axis and down [m].
         angles, zeros: joint angles are angles @ (first, upper, bend, yaw) + zeros, shape (k, 4) and (k,): azimuth of
-            the plane, elevation of the upper arm, bend of the elbow, and yaw of the tool in the base.
+            the plane, elevation of the upper arm, bend of the elbow, and yaw of the tool in the base, which only the
+            last joint turns.
         limits: of the joints, shape (k, 2) [rad]. speeds: their greatest, shape (k,) [rad/s].
         wrist: index of a joint at whose zero the wrist is straight; None: it cannot be.
         tool: from the flange to the middle of the fingertips [m]. turn: yaw of E in the flange at zero [rad].
@@ -84,8 +85,22 @@ class Arm:
         """Joint angles for a pose of E in W that it reaches, elbow up, shape (k,) [rad]."""
         return self._angles(*self._wrist(pose))
 
+    def yaws(self, pose: Array) -> tuple[float, float]:
+        """Least and greatest yaw that the last joint allows at the place of a pose of E in W [rad]."""
+        x, y, _, _, _ = self._wrist(pose)
+        azimuth, _, _, yaw = self.angles[-1]
+        ends = (
+            (self.limits[-1] - self.zeros[-1] - azimuth * self._first(x, y)) / yaw + self.turn - self.base[3]
+        )
+        return float(min(ends)), float(max(ends))
+
+    def _first(self, x: float, y: float) -> float:
+        """Azimuth of the vertical plane for a place of the tool in the base."""
+        far = math.hypot(x, y)
+        return math.atan2(y, x) + math.asin(min(max(self.aside / far, -1.0), 1.0) if far > 0 else 0.0)
+
     def _angles(self, x: float, y: float, across: float, up: float, yaw: float) -> Array:
-        first = math.atan2(y, x) + math.asin(self.aside / math.hypot(x, y))
+        first = self._first(x, y)
         bend = math.acos(self._bend(across, up))
         upper = math.atan2(up, across) + math.atan2(
             self.forearm * math.sin(bend), self.upper + self.forearm * math.cos(bend)

@@ -1,12 +1,13 @@
 """The way of the tool over time: from where it is to before the first contact, and then as planned."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..control.loop.limits import turn_within
 from ..errors import InputError
-from ..geometry import wrap_angle
 from ..geometry.pose import Array
 from ..planning.transits import PusherPath
 from ..problem import Plan, Pusher, TransitSegment
@@ -17,6 +18,9 @@ from .robot import Limits, OutOfLimits
 SLACK = 1e-6
 # Samples nearer than this are one [s].
 SAME_TIME = 1e-9
+TURN = 2 * np.pi
+# So far below its lift a hand is up [m].
+SAME_HEIGHT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +56,23 @@ class Course:
         pose = self.poses[k - 1] + (t - self.times[k - 1]) * rate if moving else self.poses[-1]
         return np.asarray(pose), rate if moving else np.zeros(4), int(self.leg[k])
 
+    def part(self, first: int, last: int, turned: float) -> "Course":
+        """From one pose to another, by their numbers, with the hand turned [rad]."""
+        keep = slice(first, last + 1)
+        poses = self.poses[keep] + np.array([0.0, 0.0, 0.0, turned])
+        return replace(self, times=self.times[keep], poses=poses, leg=self.leg[keep])
+
     def then(self, other: "Course") -> "Course":
         """This one and another that starts where it ends."""
         shift = float(self.times[-1] - other.times[0])
         keep = slice(1, None)
+        of_one = other.legs is self.legs
         return Course(
             np.concatenate([self.times, other.times[keep] + shift]),
             np.concatenate([self.poses, other.poses[keep]]),
-            np.concatenate([self.leg, other.leg[keep] + len(self.legs)]),
-            self.legs + other.legs,
-            self.pushes + other.pushes,
+            np.concatenate([self.leg, other.leg[keep] + (0 if of_one else len(self.legs))]),
+            self.legs if of_one else self.legs + other.legs,
+            self.pushes if of_one else self.pushes + other.pushes,
         )
 
     def check(self, limits: Limits) -> None:
@@ -163,26 +174,72 @@ def planned(plan: Plan, speed: float = 1.0, yaw: float | None = None) -> Course:
     return found
 
 
+def reach_of(plan: Plan) -> float:
+    """Of the fingertips from E; 0: one finger, in the middle of the hand [m]."""
+    return float(np.max(np.hypot(*plan.on_table[0].fingers.T)))
+
+
+def alike(plan: Plan) -> tuple[float, ...]:
+    """Turns after which the fingertips are where they were, best first [rad]: whole ones; half ones for two that stand
+    opposite each other; and any for one, which is round (0)."""
+    fingers = plan.on_table[0].fingers
+    if reach_of(plan) == 0:
+        return TURN, 0.0
+    return (TURN, 0.5 * TURN) if np.allclose(fingers, -fingers[::-1], rtol=0, atol=1e-9) else (TURN,)
+
+
+def in_range(course: Course, limits: Limits, pusher: Pusher, reach: float, steps: Sequence[float]) -> Course:
+    """A plan's way whose hand keeps to the range of an arm: where it would leave it before the next lift, it turns in
+    the air before.
+
+    Args:
+        pusher: whose limits hold in the air. reach: of the fingertips from E [m]. steps: as of alike.
+    """
+    if limits.arm is None:
+        return course
+    left = np.array([limits.yaws(pose) for pose in course.poses]) - course.poses[:, 3:]
+    up = np.concatenate([[0], course.poses[:, 2] > pusher.lift - SAME_HEIGHT, [0]])
+    rises, falls = np.flatnonzero(np.diff(up) > 0), np.flatnonzero(np.diff(up) < 0) - 1
+    crosses = rises < falls
+    begins, ends = [0, *falls[crosses]], [*rises[crosses], len(course.poses) - 1]
+    found, turned = course.part(0, 0, 0.0), 0.0
+    for k, (first, last) in enumerate(zip(begins, ends, strict=True)):
+        low, high = np.max(left[first : last + 1, 0]), np.min(left[first : last + 1, 1])
+        turn = turn_within(float(low) - turned, float(high) - turned, *steps)
+        if k > 0:
+            over = course.part(ends[k - 1], first, turned)
+            if turn != 0:
+                air = _over(over.poses[[0, -1]] + np.array([[0.0] * 4, [0, 0, 0, turn]]), pusher, reach)
+                over = replace(over, times=air.times, poses=air.poses, leg=air.leg + over.leg[-1])
+            found = found.then(over)
+        turned += turn
+        stays = course.part(first, last, turned)
+        found = found.then(stays) if k > 0 else stays
+    return found
+
+
 def approach(tool: Array, goal: Array, lift: float, pusher: Pusher, reach: float) -> Course:
-    """Up, over, and down, from rest to rest: from where the tool is to a pose (x, y, height, yaw) nearby in yaw.
+    """Up, over, and down, from rest to rest: from where the tool is to a pose (x, y, height, yaw), by as many turns.
 
     Args:
         lift: height at which it goes over [m]; from higher up it goes at its own height.
         pusher: whose limits hold. reach: of the fingertips from E [m].
     """
     high = max(lift, float(tool[2]), float(goal[2]))
-    turn = float(wrap_angle(goal[3] - tool[3]))
-    over = np.array([goal[0], goal[1], tool[3] + turn])
-    poses = np.array([tool[[0, 1, 3]], tool[[0, 1, 3]], over, over])
-    heights = np.array([tool[2], high, high, goal[2]])
-    moves = np.append(True, np.any(np.diff(np.column_stack([poses, heights]), axis=0) != 0, axis=1))
+    stops = np.array([tool, [*tool[:2], high, tool[3]], [*goal[:2], high, goal[3]], goal])
+    moves = np.append(True, np.any(np.diff(stops, axis=0) != 0, axis=1))
     if np.count_nonzero(moves) < 2:
         return Course(
             np.array([0.0, 1e-3]), np.array([tool, tool]), np.zeros(2, np.intp), ("approach",), (-1,)
         )
-    way = PusherPath(poses[moves], heights[moves], reach).segment(pusher, np.zeros(3))
-    table = np.column_stack([way.pusher[:, :2], way.height, way.pusher[:, 2]])
-    return Course(way.times, table, np.zeros(len(way.times), np.intp), ("approach",), (-1,))
+    return _over(stops[moves], pusher, reach)
+
+
+def _over(stops: Array, pusher: Pusher, reach: float) -> Course:
+    """From stop to stop, poses (n, 4), at rest at each."""
+    way = PusherPath(stops[:, [0, 1, 3]], stops[:, 2], reach).segment(pusher, np.zeros(3))
+    poses = np.column_stack([way.pusher[:, :2], way.height, way.pusher[:, 2]])
+    return Course(way.times, poses, np.zeros(len(way.times), np.intp), ("approach",), (-1,))
 
 
 def within(pusher: Pusher, limits: Limits, speed: float = 1.0) -> Pusher:

@@ -35,6 +35,10 @@ class Jointed(Protocol):
         """Joint angles at a pose that it reaches, shape (k,) [rad]."""
         ...
 
+    def yaws(self, pose: Array) -> tuple[float, float]:
+        """Least and greatest yaw that it can have at the place of a pose, whole turns counted [rad]."""
+        ...
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -96,6 +100,10 @@ class Limits:
             acceleration=min(self.acceleration, acceleration),
             turn_rate=min(self.turn_rate, turn_rate),
         )
+
+    def yaws(self, pose: Array) -> tuple[float, float]:
+        """Least and greatest yaw that the hand can have at the place of a pose [rad]."""
+        return (-math.inf, math.inf) if self.arm is None else self.arm.yaws(pose)
 
     def outside(self, pose: Array, slack: float = 0.0) -> str:
         """Why a pose (x, y, height, yaw) is no place for the tool, or "".

@@ -10,13 +10,14 @@ import numpy as np
 
 from ..control import AbstractController, AbstractSensor, ClosedLoopRun, ControllerState, Measurement
 from ..control.loop.frames import Seen
+from ..control.loop.limits import RESERVE, braking, turn_within
 from ..errors import InputError
 from ..geometry import compose
 from ..geometry.pose import Array
 from ..problem import Plan
 from ..simulation import Claim, verify
 from .clock import Clock, WallClock
-from .course import SLACK, Course, approach, planned, within
+from .course import SLACK, TURN, Course, alike, approach, in_range, planned, reach_of, within
 from .log import open_log
 from .robot import Limits, Robot, RobotFault, State, Target
 
@@ -28,6 +29,8 @@ MEASURED = 0.002
 WHOLE = 1e-6
 # Feedback of the tool that is kept to tell where it was when a frame was exposed [s].
 MEMORY = 2.0
+# One finger begins and ends its turn in the air within this time, less than it takes to come down [s].
+GENTLE = 0.25
 # A controller has so many times the plan's duration, and so much more [s]: it looks, and may land again.
 PATIENCE, MORE = 3.0, 200.0
 
@@ -176,7 +179,12 @@ def run(
         if eyes is None:
             raise InputError("a controller needs eyes", hint="Give what sees the object.")
         patience = PATIENCE * plan.duration / speed + MORE
-        motion = Controlled(to_controller(plan, robot, speed), controller, eyes, robot, patience)
+        begins, jointed, turn_rate = to_controller(plan, robot, speed), robot.limits.arm is not None, 0.0
+        if jointed and reach_of(plan) > 0:
+            controller = controller.with_yaws(robot.limits.yaws(begins.poses[-1]))
+        elif jointed and plan.scene.pusher.turns:
+            turn_rate = within(plan.scene.pusher, robot.limits, speed).turn_rate
+        motion = Controlled(begins, controller, eyes, robot, patience, turn_rate)
     names = (plan.scene.object.name,)
     return stream(motion, robot, time, log, told, names)
 
@@ -187,13 +195,7 @@ def way(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     Raises:
         OutOfLimits: as Course.check. RobotFault: for a robot that is not ready.
     """
-    tool = ready(robot).pose
-    course = planned(plan, speed, float(tool[3]))
-    pusher, fingers = within(plan.scene.pusher, robot.limits, speed), plan.on_table[0].fingers
-    first = approach(tool, course.poses[0], pusher.lift, pusher, float(np.max(np.hypot(*fingers.T))))
-    whole = first.then(course)
-    whole.check(robot.limits)
-    return whole
+    return _way(plan, robot, speed, alike(plan))
 
 
 def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
@@ -202,15 +204,24 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     Raises:
         OutOfLimits: as way, for the plan's own way too: a controller's is near it.
     """
-    whole = way(plan, robot, speed)
-    tool, first = ready(robot).pose, plan.on_table[0]
-    pusher, reach = within(plan.scene.pusher, robot.limits, speed), float(np.max(np.hypot(*first.fingers.T)))
-    behind = compose(first.pusher[0], [-2 * pusher.approach, 0.0, 0.0])
-    turned = behind[2] + whole.poses[-1, 3] - planned(plan).poses[-1, 3]
-    above = np.array([behind[0], behind[1], max(pusher.lift, float(tool[2])), turned])
-    found = approach(tool, above, pusher.lift, pusher, reach)
+    # A controller of two fingers tells them apart.
+    whole = _way(plan, robot, speed, (TURN,) if reach_of(plan) > 0 else alike(plan))
+    tool, pusher = ready(robot).pose, within(plan.scene.pusher, robot.limits, speed)
+    behind = compose(plan.on_table[0].pusher[0], [-2 * pusher.approach, 0.0, 0.0])
+    yaw = whole.poses[np.argmax(whole.leg > 0), 3]
+    above = np.array([behind[0], behind[1], max(pusher.lift, float(tool[2])), yaw])
+    found = approach(tool, above, pusher.lift, pusher, reach_of(plan))
     found.check(robot.limits)
     return found
+
+
+def _way(plan: Plan, robot: Robot, speed: float, steps: Sequence[float]) -> Course:
+    tool = ready(robot).pose
+    pusher, reach = within(plan.scene.pusher, robot.limits, speed), reach_of(plan)
+    course = in_range(planned(plan, speed, float(tool[3])), robot.limits, pusher, reach, steps)
+    whole = approach(tool, course.poses[0], pusher.lift, pusher, reach).then(course)
+    whole.check(robot.limits)
+    return whole
 
 
 def slowed(plan: Plan, limits: Limits, speed: float = 1.0) -> Plan:
@@ -252,6 +263,8 @@ class Controlled:
 
     Args:
         patience: the controller has so long [s]. The others are as of run.
+        turn_rate: at which one finger, which is round, turns back into the range of its arm while it is in the air
+            [rad/s], whatever the controller says; 0: the hand turns as the controller says.
 
     Raises:
         InputError: for a controller whose tick is no whole number of the robot's periods.
@@ -264,8 +277,9 @@ class Controlled:
         eyes: AbstractSensor,
         robot: Robot,
         patience: float,
+        turn_rate: float = 0.0,
     ) -> None:
-        self.patience = patience
+        self.patience, self.turn_rate = patience, turn_rate
         self.played, self.controller, self.eyes, self.robot = (
             Played(course, robot.limits.period),
             controller,
@@ -284,10 +298,12 @@ class Controlled:
         self.seeing = eyes.start()
         self.control: ControllerState | None = None
         self.pose, self.twist, self.count = course.poses[-1].copy(), np.zeros(4), 0
+        # By how much the tool is turned against the controller's hand [rad], and how fast that grows.
+        self.turned, self.turning = 0.0, 0.0
         self.tool: list[tuple[float, Array]] = []
 
     def step(self, now: float, state: State) -> Wanted:
-        self.tool.append((state.stamp, state.pose))
+        self.tool.append((state.stamp, state.pose - np.array([0.0, 0.0, 0.0, self.turned])))
         while self.tool[0][0] < now - MEMORY:
             self.tool.pop(0)
         if self.control is None:
@@ -304,6 +320,7 @@ class Controlled:
             return Wanted(self.pose, np.zeros(4), outcome=late)
         self.count += 1
         self.pose = self.pose + period * self.twist
+        self.turned += period * self.turning
         return Wanted(
             self.pose, self.twist, self.control.mode, mode=self.control.mode, note=self.control.note
         )
@@ -313,7 +330,7 @@ class Controlled:
         assert self.control is not None
         expose, known = getattr(self.eyes, "expose", None), getattr(self.robot, "object", None)
         if expose is not None and known is not None:
-            self.seeing = expose(self.seeing, now, known, state.pose[[0, 1, 3]])
+            self.seeing = expose(self.seeing, now, known, self.tool[-1][1][[0, 1, 3]])
         self.seeing, frames = self.eyes.arrived(self.seeing, now)
         frame = self._with_tool(frames[-1]) if frames else None
         self.control, command = self.controller.step(self.control, frame, now)
@@ -326,8 +343,18 @@ class Controlled:
             raise RobotFault(
                 f"the controller asks for an acceleration of {1000 * change:.0f} mm/s², above {1000 * most:g} mm/s²"
             )
-        self.twist = twist
+        if self.turn_rate > 0 and max(command.height, float(self.pose[2])) > 0:
+            twist[3] = self._in_the_air(float(twist[2]), hold)
+        self.twist, self.turning = twist, float(twist[3]) - spin
         return self.control.outcome
+
+    def _in_the_air(self, climb: float, hold: float) -> float:
+        """The rate at which a round finger turns: it rests, but where a push may turn it out of its arm's range."""
+        low, high = (float(end - self.pose[3]) for end in self.robot.limits.yaws(self.pose))
+        turn = 0.0 if climb < 0 else turn_within(low + RESERVE, high - RESERVE, 0.0)
+        gain, last = self.turn_rate / GENTLE, float(self.twist[3])
+        rate = math.copysign(min(self.turn_rate, braking(abs(turn), gain, hold)), turn)
+        return float(np.clip(rate, last - gain * hold, last + gain * hold))
 
     def _with_tool(self, frame: Measurement) -> Measurement:
         """With the tool's pose at the exposure, where the frame has none."""

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
@@ -69,6 +69,11 @@ class AbstractController(ABC, Generic[StateT]):
     def act(self, state: StateT, time: float) -> tuple[StateT, Command]:
         """The state after a tick that begins at `time` [s], and what the pusher should do, from frames that are good
         and young; see `step`."""
+
+    def with_yaws(self, yaws: tuple[float, float]) -> Self:
+        """The same for a hand that has these yaws only, from the least to the greatest, whole turns counted [rad]; a
+        controller that cannot choose at which it lands is itself."""
+        return self
 
     def noticed(self, state: StateT, frame: Measurement) -> StateT:
         """The state after a good frame has come; it is in state.seen."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...formulas import formula
-from ...geometry import pose_error
+from ...geometry import pose_error, wrap_angle
 from ...geometry.pose import Array
 from ...problem import Pusher
 from .measurement import Command, Measurement
@@ -26,6 +26,8 @@ DEVIATIONS = 8.0
 # A pushed object runs at most so many times as fast as the finger, and it turns about a point that is at least this
 # share of its size away from the contact.
 FASTER, NEAREST = 2.0, 0.15
+# A hand that lands has so much of its range left to both sides, where there is as much [rad]; few pushes turn it more.
+RESERVE = math.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,7 @@ class Limits:
         travel_speed, travel_acceleration: of the fastest fingertip while the hand is lifted, rising included [m/s],
             [m/s²].
         size: of the object that is pushed [m]; 0: no frame is impossible.
+        yaws: least and greatest yaw that the hand can have, whole turns counted [rad].
     """
 
     tips: Array
@@ -48,6 +51,7 @@ class Limits:
     travel_speed: float
     travel_acceleration: float
     size: float = 0.0
+    yaws: tuple[float, float] = (-math.inf, math.inf)
 
     def __post_init__(self) -> None:
         tips = np.array(self.tips, dtype=float)
@@ -75,6 +79,21 @@ class Limits:
     def reach(self) -> float:
         """From E's origin to the farthest fingertip [m]."""
         return float(np.max(np.hypot(*self.tips.T)))
+
+    def landing(self, yaw: float, here: float) -> float:
+        """The yaw at which a hand lands that is `here`, whole turns from a given one: the short way, or where that
+        leaves too little of its range, nearest to the middle of it; all in W, whole turns counted [rad].
+
+        >>> tip, turn = np.zeros((1, 2)), 2 * math.pi
+        >>> arm = Limits(tip, 0.02, 0.1, 1.5, 0.1, 0.5, yaws=(-turn, turn))
+        >>> [round(math.degrees(arm.landing(math.radians(170), math.radians(here)))) for here in (0, 170, 300, -170)]
+        [170, 170, 170, 170]
+        >>> round(math.degrees(arm.landing(math.radians(-170), math.radians(175))))
+        -170
+        """
+        short = here + float(wrap_angle(yaw - here))
+        low, high = (end - short for end in self.yaws)
+        return short + turn_within(low + RESERVE, high - RESERVE, 2 * math.pi)
 
     def kept(self, last: Command, climb: float, wanted: Command, yaw: float, dt: float) -> Command:
         """The command nearest to the wanted one, on the way from the last motion, that keeps to every limit.
@@ -157,6 +176,26 @@ class Limits:
         speed = min(0.95 * most, now + gain * dt, braking(length, gain, dt))
         rates = speed * way
         return Command(rates[:3], max(0.0, height + float(rates[3]) * dt))
+
+
+def turn_within(low: float, high: float, *steps: float) -> float:
+    """The turn that brings a hand into its range: none where it is there; else as near to the middle as steps come.
+
+    Args:
+        low, high: turns that lead to the ends of the range [rad]. steps: in which it may turn; the first with which it
+            gets there, or the last; 0: by anything.
+
+    >>> turn_within(-1.0, 2.0, 3.0), turn_within(1.0, 4.0, 3.0), turn_within(1.0, 2.0, 3.0, 0.0)
+    (0.0, 3.0, 1.5)
+    """
+    if low <= 0 <= high:
+        return 0.0
+    turn, middle = 0.0, 0.5 * (low + high)
+    for step in steps:
+        turn = step * round(middle / step) if step > 0 else middle
+        if low <= turn <= high:
+            break
+    return turn
 
 
 def braking(length: float, deceleration: float, dt: float) -> float:

@@ -1,12 +1,12 @@
 """Following a whole plan: each push under feedback, and between pushes the pusher goes to where the object now is."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
 from ...errors import InputError
-from ...geometry import compose, pose_error, relative, transform
+from ...geometry import compose, relative, transform
 from ...geometry.pose import Array
 from ...planning.options import PushOption, push_option
 from ...problem import Plan, PushSegment, Scene
@@ -189,6 +189,9 @@ class PlanController(AbstractController[PlanState]):
         """X_WE a distance `before` [m] the contact of a push of that number, with the object at a pose X_WO."""
         return compose(pose, compose(self._model(push).pusher, [-before, 0.0, 0.0]))
 
+    def with_yaws(self, yaws: tuple[float, float]) -> Self:
+        return replace(self, limits=replace(self.limits, yaws=yaws))
+
     def start(self, time: float = 0.0) -> PlanState:
         if not np.isfinite(time):
             raise InputError("a time is finite", value=time)
@@ -235,8 +238,7 @@ class PlanController(AbstractController[PlanState]):
         assert state.known is not None
         pusher, pose = self.plan.scene.pusher, state.known.pose
         before, contact = (self.landing(state.push, pose, d) for d in (pusher.approach, 0.0))
-        # The hand turns the short way.
-        before[2] = here[2] + pose_error(before, here)[2]
+        before[2] = self.limits.landing(float(before[2]), float(here[2]))
         contact[2] = before[2]
         stops = ([*here, pusher.lift], [*before, pusher.lift], [*before, 0.0], [*contact, 0.0])
         return replace(state, phase=Travelling(tuple(np.array(stop) for stop in stops), True), note="")

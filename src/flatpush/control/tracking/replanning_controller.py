@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -122,6 +123,9 @@ class ReplanningController(AbstractController[ReplanningState]):
         limits = Limits.of(scene.pusher, tips, scene.object.outline.size)
         return cls(planner, tolerance, limits, rate, landings, 0.5 + latency, sd)
 
+    def with_yaws(self, yaws: tuple[float, float]) -> Self:
+        return replace(self, limits=replace(self.limits, yaws=yaws))
+
     @property
     def scene(self) -> Scene:
         return self.planner.scene
@@ -201,7 +205,7 @@ class ReplanningController(AbstractController[ReplanningState]):
         plan = Plan("solved", scene, first.cost, segments=segments)
         inner = PlanController.of(
             plan, "path", self.rate, sd=self.noise, stale=self.stale, tolerance=self.tolerance
-        )
+        ).with_yaws(self.limits.yaws)
         # It has been looked at: the push begins with a landing.
         below, landing = replace(inner.start(time), phase=state.looking), state.landings + 1
         state = replace(state, inner=inner, below=below, margin=found.margin, landings=landing, stuck=0)

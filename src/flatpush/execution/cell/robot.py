@@ -12,12 +12,13 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...control.loop.limits import turn_within
 from ...errors import InputError, MissingExtra
 from ...geometry.pose import Array
 from ...problem import Plan
 from ..addresses import Address
 from ..arms import ARMS, Arm
-from ..course import planned
+from ..course import alike, planned
 from ..robot import Limits, OutOfLimits, RobotFault, State
 from ..simulated import DryRun, Unknown, home_of
 from .model import DAMPING, FOOT, STEP, STIFFNESS, Physics, cell_xml, height_of
@@ -79,7 +80,11 @@ class CellRobot(DryRun):
             # Heights of E count from the middle of the object, which is above the table.
             arm = replace(arm, height=height_of(scene) / 2 + FOOT)
             limits = replace(limits, arm=arm)
-        super().__init__(home_of(plan) if home is None else home, limits)
+        if home is None:
+            home = home_of(plan)
+            low, high = limits.yaws(home)
+            home[3] += turn_within(low - home[3], high - home[3], *alike(plan))
+        super().__init__(home, limits)
         self._mujoco, self._arm = load(), arm
         if height_of(scene) / 2 + scene.pusher.lift - scene.pusher.tip_radius < height_of(scene):
             raise InputError(
