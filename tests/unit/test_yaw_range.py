@@ -15,7 +15,7 @@ from flatpush.execution import DONE, OutOfLimits, open_robot, run
 from flatpush.execution.arms import ARMS
 from flatpush.execution.course import alike, in_range, planned, reach_of
 from flatpush.execution.robot import Limits
-from flatpush.execution.run import slowed
+from flatpush.execution.run import slowed, way
 from flatpush.execution.simulated import SimRobot, home_of
 from flatpush.geometry import pose_error
 
@@ -187,3 +187,28 @@ def test_two_fingers_land_within_the_range(block, law):
     assert ended.outcome == (DONE if law is None else "arrived")
     assert np.hypot(*error[:2]) < 0.001
     assert abs(error[2]) < math.radians(1)
+
+
+class Beside(Narrow):
+    """One whose hand has a yaw from -20° to 140°: none of the plan's without half a turn."""
+
+    def yaws(self, pose):
+        return math.radians(-20), math.radians(140)
+
+
+@pytest.mark.parametrize("law", [None, "path", "horizon"])
+def test_two_fingers_that_stand_alike_are_exchanged(block, law):
+    pushes = (fp.Push("right", block.outline.nearest(SIDES["right"]), 2, 0.018),)
+    pusher = fp.Pusher(fingers=2, spacing=0.018)
+    plan = fp.plan(fp.Scene(block, (0.06, -0.02, -0.2), (0.0, 0.0, 0.0), pusher, pushes))
+    limits = replace(Limits(), arm=Beside())
+    with SimRobot(plan, home=[0.1, 0.0, 0.03, 0.3], limits=limits) as robot:
+        ended = run(plan, robot) if law is None else followed(plan, robot, law)
+        error = pose_error(robot.object, plan.scene.goal)
+    assert ended.outcome == (DONE if law is None else "arrived")
+    assert np.hypot(*error[:2]) < 0.001
+    assert abs(error[2]) < math.radians(1)
+    lopsided = replace(plan.pushes[0], fingers=plan.pushes[0].fingers + np.array([0.0, 1e-6]))
+    other = replace(plan, segments=(plan.segments[0], lopsided, plan.segments[2]))
+    with SimRobot(plan, home=[0.1, 0.0, 0.03, 0.3], limits=limits) as robot, pytest.raises(OutOfLimits):
+        way(other, robot)

@@ -19,7 +19,7 @@ from ..simulation import Claim, verify
 from .clock import Clock, WallClock
 from .course import SLACK, TURN, Course, alike, approach, in_range, planned, reach_of, within
 from .log import open_log
-from .robot import Limits, Robot, RobotFault, State, Target
+from .robot import Limits, OutOfLimits, Robot, RobotFault, State, Target
 
 #: Outcome of a run in which the whole plan was made, open loop.
 DONE = "done"
@@ -179,12 +179,14 @@ def run(
         if eyes is None:
             raise InputError("a controller needs eyes", hint="Give what sees the object.")
         patience = PATIENCE * plan.duration / speed + MORE
-        begins, jointed, turn_rate = to_controller(plan, robot, speed), robot.limits.arm is not None, 0.0
-        if jointed and reach_of(plan) > 0:
-            controller = controller.with_yaws(robot.limits.yaws(begins.poses[-1]))
-        elif jointed and plan.scene.pusher.turns:
+        begins, turned, turn_rate = to_controller(plan, robot, speed), 0.0, 0.0
+        if robot.limits.arm is not None and reach_of(plan) > 0:
+            turned = math.remainder(begins.poses[-1, 3] - plan.on_table[0].pusher[0, 2], TURN)
+            low, high = robot.limits.yaws(begins.poses[-1])
+            controller = controller.with_yaws((low - turned, high - turned))
+        elif robot.limits.arm is not None and plan.scene.pusher.turns:
             turn_rate = within(plan.scene.pusher, robot.limits, speed).turn_rate
-        motion = Controlled(begins, controller, eyes, robot, patience, turn_rate)
+        motion = Controlled(begins, controller, eyes, robot, patience, turned, turn_rate)
     names = (plan.scene.object.name,)
     return stream(motion, robot, time, log, told, names)
 
@@ -204,8 +206,7 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     Raises:
         OutOfLimits: as way, for the plan's own way too: a controller's is near it.
     """
-    # A controller of two fingers tells them apart.
-    whole = _way(plan, robot, speed, (TURN,) if reach_of(plan) > 0 else alike(plan))
+    whole = _way_under_feedback(plan, robot, speed)
     tool, pusher = ready(robot).pose, within(plan.scene.pusher, robot.limits, speed)
     behind = compose(plan.on_table[0].pusher[0], [-2 * pusher.approach, 0.0, 0.0])
     yaw = whole.poses[np.argmax(whole.leg > 0), 3]
@@ -215,10 +216,22 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     return found
 
 
-def _way(plan: Plan, robot: Robot, speed: float, steps: Sequence[float]) -> Course:
+def _way_under_feedback(plan: Plan, robot: Robot, speed: float) -> Course:
+    """As way; a controller tells two fingers apart, so that they are exchanged for the whole plan or not at all."""
+    steps = alike(plan)
+    if reach_of(plan) == 0:
+        return _way(plan, robot, speed, steps)
+    try:
+        return _way(plan, robot, speed, (TURN,))
+    except OutOfLimits:
+        return _way(plan, robot, speed, (TURN,), steps[-1])
+
+
+def _way(plan: Plan, robot: Robot, speed: float, steps: Sequence[float], turned: float = 0.0) -> Course:
     tool = ready(robot).pose
     pusher, reach = within(plan.scene.pusher, robot.limits, speed), reach_of(plan)
-    course = in_range(planned(plan, speed, float(tool[3])), robot.limits, pusher, reach, steps)
+    course = planned(plan, speed, float(tool[3]) - turned)
+    course = in_range(course.part(0, len(course.times), turned), robot.limits, pusher, reach, steps)
     whole = approach(tool, course.poses[0], pusher.lift, pusher, reach).then(course)
     whole.check(robot.limits)
     return whole
@@ -263,6 +276,7 @@ class Controlled:
 
     Args:
         patience: the controller has so long [s]. The others are as of run.
+        turned: by how much the tool is turned against the controller's hand at first [rad].
         turn_rate: at which one finger, which is round, turns back into the range of its arm while it is in the air
             [rad/s], whatever the controller says; 0: the hand turns as the controller says.
 
@@ -277,6 +291,7 @@ class Controlled:
         eyes: AbstractSensor,
         robot: Robot,
         patience: float,
+        turned: float = 0.0,
         turn_rate: float = 0.0,
     ) -> None:
         self.patience, self.turn_rate = patience, turn_rate
@@ -298,8 +313,8 @@ class Controlled:
         self.seeing = eyes.start()
         self.control: ControllerState | None = None
         self.pose, self.twist, self.count = course.poses[-1].copy(), np.zeros(4), 0
-        # By how much the tool is turned against the controller's hand [rad], and how fast that grows.
-        self.turned, self.turning = 0.0, 0.0
+        # How fast that grows [rad/s].
+        self.turned, self.turning = turned, 0.0
         self.tool: list[tuple[float, Array]] = []
 
     def step(self, now: float, state: State) -> Wanted:
