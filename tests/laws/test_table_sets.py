@@ -191,7 +191,7 @@ def test_within_a_patch_powers_leave_their_bounds_nowhere(name):
         places = np.array(places).transpose(1, 0, 2)
     first_used, second_used = [], []
     for V in turning(rng, 40):
-        g, first, second = (values[0] for values in tables._powers(cone.lever, V[None], cone.faces))
+        g, first, second = (values[0] for values in tables._powers(cone.lever, V[None], cone.faces)[:3])
         v = V[:2] + V[2] * perpendicular(places)
         unit = v / np.linalg.norm(v, axis=-1)[..., None]
         torque = (places[..., 0] * unit[..., 1] - places[..., 1] * unit[..., 0]) / cone.lever

@@ -23,6 +23,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,7 +142,7 @@ class TableSet:
         """The depth under a face (3,) of the wrench of given loads (n,), by the nominal wrench's size."""
         V = np.asarray(twist, dtype=float).reshape(1, 3)
         g, *_ = self._powers(cone.lever, V, face[None])
-        *_, size = self._ranges(cone.faces, cone.lever, V)
+        _, _, size, _ = self._ranges(cone.faces, cone.lever, V)
         return float(g[0, 0] @ loads / size[0])
 
     @cached_property
@@ -186,7 +187,7 @@ class TableSet:
         is not kept on the nominal table.
         """
         V = np.asarray(twist, dtype=float)
-        nominal, spread, _ = self._ranges(cone.faces, cone.lever, V.reshape(-1, 3))
+        nominal, spread, *_ = self._ranges(cone.faces, cone.lever, V.reshape(-1, 3))
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(spread > nominal, nominal / spread, 1.0)
         return np.clip(np.min(share, axis=1), 0.0, 1.0).reshape(V.shape[:-1])
@@ -200,7 +201,7 @@ class TableSet:
         Returns:
             shape (m, k).
         """
-        nominal, spread, size = self._ranges(faces, lever, V)
+        nominal, spread, size, _ = self._ranges(faces, lever, V)
         return np.asarray((nominal - self.share * spread) / size[:, None])
 
     def heights_between(self, faces: Array, lever: float, V: Array) -> Array:
@@ -213,8 +214,7 @@ class TableSet:
         Returns:
             shape (m - 1, k).
         """
-        nominal, spread, size = self._ranges(faces, lever, V)
-        unit, distance = self._velocities(V)
+        nominal, spread, size, (g, first, _, unit, distance, arms) = self._ranges(faces, lever, V)
         room = self.reach + self.step
         with np.errstate(divide="ignore", invalid="ignore"):
             centres = perpendicular(V[:, :2]) / V[:, 2:]
@@ -226,8 +226,7 @@ class TableSet:
         turn = np.arccos(np.clip(np.sum(unit[:-1] * unit[1:], axis=-1), -1.0, 1.0))
         turn = np.minimum(seen, turn + around[:-1] + around[1:])
         chord = np.fmin(2 * np.sin(0.5 * np.minimum(turn, np.pi)), second)[:, None]
-        arms = np.linalg.norm(_arms(faces, lever, self.points), axis=-1) + np.abs(faces[:, 2:]) / lever * room
-        g, first, _ = self._powers(lever, V, faces)
+        arms = arms + np.abs(faces[:, 2:]) / lever * room
         fall = g + first + arms  # to the least power
         fall = np.where(
             chord * arms * 2 < fall[:-1] + fall[1:], chord * arms, np.stack([fall[:-1], fall[1:]])
@@ -237,39 +236,39 @@ class TableSet:
         ends = (np.stack([least[:-1], least[1:]]) - off) / np.stack([size[:-1], size[1:]])[..., None]
         return np.asarray(np.min(ends, axis=0))
 
-    def _ranges(self, faces: Array, lever: float, V: Array) -> tuple[Array, Array, Array]:
-        """n · W̄ and min ∫ |g - m| dw̄ for each face, shapes (m, k), and the sizes of the nominal wrenches (m,).
+    def _ranges(self, faces: Array, lever: float, V: Array) -> tuple[Array, Array, Array, "_Powers"]:
+        """n · W̄ and min ∫ |g - m| dw̄ for each face, shapes (m, k), the sizes of the nominal wrenches (m,), and g.
 
         Of places in the hand the first is less, and the second more, by what lies between.
         """
-        g, first, second = self._powers(lever, V, faces)
+        powers = self._powers(lever, V, faces)
+        g, first, second, unit, distance, arms = powers
         if np.any(self.reach > 0):
             W = self.support.wrench(V) / [1.0, 1.0, lever]
             nominal = W @ faces.T
         else:
             nominal = g @ self.weights
-            W = self._wrenches(lever, V)
+            W = self._wrenches(lever, unit)
         spread = self._spread(g, first, second)
         # By the nominal wrench's size, as a depth is.
         size = np.maximum(np.linalg.norm(W, axis=1), 1e-300)
         if self.step > 0:
-            between = self._between(lever, V, faces) @ self.weights
+            between = self._between(lever, distance, faces, arms) @ self.weights
             nominal, spread = nominal - between, spread + between
-        return nominal, spread, size
+        return nominal, spread, size, powers
 
     def _spread(self, g: Array, first: Array, second: Array) -> Array:
         """min ∫ |g - m| dw̄ over m, shape (...), of g at each point (..., n); of patches, not less than that."""
         off = np.abs(g - _weighted_median(g, self.weights)[..., None])
         return np.asarray((off + np.where(off > first, np.minimum(first, second), first)) @ self.weights)
 
-    def _between(self, lever: float, V: Array, faces: Array) -> Array:
+    def _between(self, lever: float, distance: Array, faces: Array, arms: Array) -> Array:
         """By how much g may fall short of the line between its values here and a step aside, shape (m, k, n).
 
         Along a line g = a · û has |g''| ≤ |a| |û''| + 2 |a'| |û'|; where a centre is near, its range tells more.
         """
-        _, distance = self._velocities(V)
         slope = np.abs(faces[:, 2:]) / lever
-        far = np.linalg.norm(_arms(faces, lever, self.points), axis=-1) + slope * (self.reach + self.step)
+        far = arms + slope * (self.reach + self.step)
         away = distance - self.reach
         near = 1 / np.maximum(away - self.step, UNDER * self.radius)[:, None]
         second = self.step**2 / 8 * (far * SWING * near**2 + 2 * slope * near)
@@ -277,8 +276,7 @@ class TableSet:
         chord = np.where(away > self.step, 2 * np.sin(0.5 * turn), 2.0)[:, None]
         return np.minimum(second, 2 * np.minimum(far, far * chord + slope * self.step))
 
-    def _wrenches(self, lever: float, V: Array) -> Array:
-        unit, _ = self._velocities(V)
+    def _wrenches(self, lever: float, unit: Array) -> Array:
         x, y = self.points.T
         torque = x * unit[..., 1] - y * unit[..., 0]
         return np.stack(
@@ -295,21 +293,18 @@ class TableSet:
             unit = np.where((distance > UNDER * self.radius)[..., None], v / speed[..., None], 0.0)
         return unit, distance
 
-    def _powers(self, lever: float, V: Array, faces: Array) -> tuple[Array, Array, Array]:
-        """g of each twist, face and point, and bounds for each patch, shapes (m, k, n).
-
-        The bounds: of |g - g(p)| at every point of the patch, p its centroid, and of the mean of g - g(p) over it.
-        """
+    def _powers(self, lever: float, V: Array, faces: Array) -> "_Powers":
         unit, distance = self._velocities(V)
-        a = _arms(faces, lever, self.points)  # g = a · û
+        # g = a · û, a = n_xy + n_τ perp(p)
+        a = faces[:, None, :2] + faces[:, None, 2:] * perpendicular(self.points) / lever
+        size = np.linalg.norm(a, axis=-1)
         g = np.einsum("mni,kni->mkn", unit, a)
         resting = ~np.any(unit != 0, axis=-1)
         if np.any(resting):
-            g = np.where(resting[:, None], -np.linalg.norm(a, axis=-1), g)
+            g = np.where(resting[:, None], -size, g)
         if not np.any(self.reach > 0):
-            return g, np.zeros(1), np.zeros(1)
+            return _Powers(g, np.zeros(1), np.zeros(1), unit, distance, size)
         h, slope = self.reach, np.abs(faces[:, 2:]) / lever  # |∇a|
-        size = np.linalg.norm(a, axis=-1)
         # û turns by at most asin(h / d) within h of p; elsewhere, about a centre at d < h, it may be anything.
         with np.errstate(invalid="ignore", divide="ignore"):
             turn = np.where(distance > h, np.arcsin(np.minimum(h / distance, 1.0)), np.pi)
@@ -328,12 +323,25 @@ class TableSet:
         straight = np.any(self.along != 0, axis=1)
         rate = np.where(straight, np.abs(swing * u + lean * v), np.hypot(swing, lean))
         chord = 2 * np.sin(0.5 * turn)[:, None]
-        return g, np.fmin(chord * size + slope * h, rate * h + second), second
+        return _Powers(g, np.fmin(chord * size + slope * h, rate * h + second), second, unit, distance, size)
 
 
-def _arms(faces: Array, lever: float, points: Array) -> Array:
-    """a = n_xy + n_τ perp(p) of normals (k, 3) and points (n, 2), shape (k, n, 2)."""
-    return np.asarray(faces[:, None, :2] + faces[:, None, 2:] * perpendicular(points) / lever)
+class _Powers(NamedTuple):
+    """g of each twist, face and point, shape (m, k, n), and what it comes from.
+
+    Attributes:
+        first, second: bounds of |g - g(p)| at every point of a patch, p its centroid, and of the mean of g - g(p) over
+            it, shapes as g's; of feet 0.
+        unit, distance: of each twist and point, see TableSet._velocities.
+        arms: |a| of g = a · û, shape (k, n).
+    """
+
+    g: Array
+    first: Array
+    second: Array
+    unit: Array
+    distance: Array
+    arms: Array
 
 
 def _weighted_median(values: Array, weights: Array) -> Array:

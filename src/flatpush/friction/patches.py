@@ -1,5 +1,6 @@
 """A pressure divided into patches with stated sizes, for bounds that must hold at every point of it."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from .pressure import Edges, Feet, Pressure, Round
 
 
 class Patches(NamedTuple):
-    """A pressure about its centre, in patches.
+    """A pressure about its centre, in patches; arrays are read-only.
 
     Attributes:
         points: the centroid of each, shape (n, 2) [m].
@@ -24,12 +25,20 @@ class Patches(NamedTuple):
     along: Array
 
 
+@lru_cache(maxsize=64)
 def patches(pressure: Pressure, count: int) -> Patches:
     """About so many patches of a pressure; of feet one each.
 
     Raises:
         TypeError: for a kind of pressure that has no patches.
     """
+    found = _divided(pressure, count)
+    for values in found:
+        values.setflags(write=False)
+    return found
+
+
+def _divided(pressure: Pressure, count: int) -> Patches:
     if isinstance(pressure, Feet):
         none = np.zeros_like(pressure.points)
         return Patches(pressure.points, pressure.weights, none[:, 0], none)
