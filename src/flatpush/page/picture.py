@@ -62,6 +62,10 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
         rows.append(("a start beside moves the end", f"{certificate.sensitivity['place']:.1f}-fold"))
     if certificate.clearance is not None:
         rows.append(("clearance", f"{MM * certificate.clearance:.2f} mm"))
+    bounds, worst, margin = certificate.set_bounds, certificate.set_worst, certificate.set_margin
+    if bounds and worst and margin is not None and certificate.set_loads is not None:
+        rows.append((f"loads within {100 * bounds.loads:.3g} %", "proved" if margin >= 0 else "not proved"))
+        rows.append((f"beyond {100 * certificate.set_loads:.3g} %", worst.gives_way))
     if certificate.tube and certificate.set_end is not None:
         dx, dy = (MM * side for side in certificate.set_end)
         rows.append(("from every start", f"± {dx:.3f} mm in x, ± {dy:.3f} mm in y"))

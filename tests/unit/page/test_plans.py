@@ -74,6 +74,15 @@ def test_a_picture_holds_the_motion_and_the_words_of_the_plan(planner, document)
     assert saved({"what": "figure"}, plan)["text"].startswith("<svg")
 
 
+def test_a_picture_says_for_which_loads_a_plan_is_proved_and_what_gives_way_beyond(planner, document):
+    document["object"]["uncertainty"] = {"loads": 0.1}
+    *_, (plan, traces) = planner.answers(document)
+    certificate = plan.certificate
+    rows = dict(picture(plan, traces)["proved"])
+    assert rows["loads within 10 %"] == "proved"
+    assert rows[f"beyond {100 * certificate.set_loads:.3g} %"] == certificate.set_worst.gives_way
+
+
 def test_a_picture_shows_slides_by_the_path_of_the_centre(document):
     """A brick without friction at the finger: no push steers it, and it is brought to its goal by slides."""
     document["object"] = {"outline": [[-30, -20], [30, -20], [30, 20], [-30, 20]], "friction": 0}
