@@ -12,7 +12,8 @@ import flatpush as fp
 from flatpush.contact import WrenchCone, narrowed
 from flatpush.contact.cone_twists import cone_twists
 from flatpush.contact.proved_twists import Bounds, NothingProved, proved_twists
-from flatpush.contact.table_set import WIDE, TableSet, set_twists
+from flatpush.contact.set_twists import WIDE, set_twists
+from flatpush.contact.table_set import TableSet
 from flatpush.friction.patches import patches
 from flatpush.geometry import perpendicular
 

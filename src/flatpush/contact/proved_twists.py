@@ -11,7 +11,8 @@ from ..errors import NoDubinsReduction
 from ..friction.support import Support
 from ..geometry.pose import Array
 from .point_contact import PointContact
-from .table_set import TableSet, has_car, set_twists, side_along
+from .set_twists import has_car, set_twists
+from .table_set import TableSet, side_along
 from .wrench_cone import WrenchCone, narrowed
 
 # The value of a bound up to which a car remains is told in two figures. It is sought until it is known to this share,
