@@ -5,6 +5,7 @@ import math
 import os
 import signal
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -122,6 +123,27 @@ def test_interrupts_and_ends_of_the_robot_stop_in_every_phase(triangle, tmp_path
         ):
             more, outcome = ends(robot, plan, tmp_path, phase, controller.process.kill)
         assert 0 <= more <= 11, outcome
+
+
+@pytest.mark.slow
+def test_a_robot_that_freezes_in_any_phase_ends_the_run_and_rests_when_it_goes_on(triangle, tmp_path):
+    plan, joints = long_push(triangle)
+    for phase in PHASES:
+        with (
+            Controller(joints=joints) as controller,
+            robot_at(controller.host, base=ASIDE, silence=2.0) as robot,
+        ):
+            freeze = partial(controller.process.send_signal, signal.SIGSTOP)
+            more, outcome = ends(robot, plan, tmp_path, phase, freeze)
+            assert 0 <= more <= 11, outcome
+            last = robot.state()
+            assert np.linalg.norm(last.twist[:3]) > 0.001, phase  # it was under way
+            controller.process.send_signal(signal.SIGCONT)
+            there = robot.limits.arm.joints(last.pose)
+            moved = np.array([controller.asked()["q"] for _ in range(500)]) - there
+            # Each answer is a millisecond of the robot or more.
+            assert np.abs(moved).max() < 0.005, phase
+            assert np.abs(moved[100:] - moved[-1]).max() < 2e-3, phase
 
 
 @pytest.mark.slow
