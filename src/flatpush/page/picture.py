@@ -68,7 +68,7 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
         rows.append((f"beyond {100 * certificate.set_loads:.3g} %", worst.gives_way))
     if certificate.tube and certificate.set_end is not None:
         dx, dy = (MM * side for side in certificate.set_end)
-        rows.append(("from every start", f"± {dx:.3f} mm in x, ± {dy:.3f} mm in y"))
+        rows.append(("from every start", f"x ± {dx:.3f} mm, y ± {dy:.3f} mm"))
     return rows
 
 
