@@ -26,6 +26,7 @@ def test_trapezoid(length, radius):
     assert fractions[-1] == 1
     assert times[-1] == pytest.approx(law.duration)
     assert fractions == pytest.approx(law.travelled(times) / length)
+    assert np.max(np.diff(fractions)) <= (1 + 1e-9) / 7
 
 
 def test_samples_are_dense_enough_for_straight_interpolation(one_finger_plan, two_finger_plan):

@@ -6,16 +6,22 @@ from typing import Literal
 import numpy as np
 
 from ..errors import NoDubinsReduction
+from ..friction.exact import Exact
+from ..friction.support import Support
 from ..friction.surface import LimitSurface
-from ..geometry import cross, perpendicular
+from ..geometry import cross, perpendicular, velocity_at
 from ..geometry.pose import Array
 from .point_contact import PointContact
-from .straight import PAST_EDGE
 from .wrench_cone import CLOSED, WrenchCone, narrowed, straight_wrenches
 
 Cost = Literal["flat", "pusher", "time"]
 # Wrenches between two edges of the narrowed cone that are tried beside the edges.
 ON_FACE = 1
+# Fingers that go straight from sample to sample turn the object about points up to so far from the planned one [m]:
+# planning.segments samples turns so finely. Feet so near to the centre may then resist in any direction.
+OFF_CENTRE = 2.5e-4
+# How far a wrench is moved at once, of its way to the straight one, and how exactly the end of that is found.
+MOVED, FOUND = 1 / 64, 1 / 1024
 # Choices that differ by less than this part are equal; the first is taken, so that rounding does not decide.
 EQUAL = 1e-7
 
@@ -103,8 +109,8 @@ def _turns(
 ) -> tuple[Array, Array]:
     """Twists of wrenches on the narrowed cone, left turns (ω = 1) and right turns (ω = -1).
 
-    A wrench on a facet shares its twist, a rotation about a support point, with all others there. It is moved towards
-    the straight one until all of them lie in the whole cone, or until it is off the facet.
+    The wrench of an object on feet, whose friction changes much where the turning centre is off by little, is moved
+    towards the straight one until the whole cone holds it nevertheless.
     """
     rays = inner.wrenches[inner.order()]
     rays = rays / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
@@ -112,10 +118,8 @@ def _turns(
     parts = np.arange(between + 1) / (between + 1)
     wrenches = np.concatenate([(1 - s) * rays + s * nexts for s in parts])
     twists = surface.twist(wrenches)
-    if surface.has_facets:
-        twists = np.array(
-            [_off_facet(cone, surface, *each, towards) for each in zip(wrenches, twists, strict=True)]
-        )
+    if isinstance(surface, Exact) and surface.has_facets:
+        twists = np.array([_off_feet(cone, surface, F, towards) for F in wrenches])
     kept = twists[:, 2] != 0
     turns = twists[kept] / np.abs(twists[kept, 2:])
     lefts, rights = turns[turns[:, 2] > 0], turns[turns[:, 2] < 0]
@@ -124,15 +128,39 @@ def _turns(
     return lefts, rights
 
 
-def _off_facet(cone: WrenchCone, surface: LimitSurface, F: Array, V: Array, towards: Array) -> Array:
-    """The twist V of a wrench F, both (3,), or of one nearer to the straight one that the cone holds; zero if none."""
-    way, step = 0.0, PAST_EDGE
-    while V[2] != 0 and cone.depths(surface.wrench_set(V))[0] < -CLOSED:
-        way, step = way + step, 1.5 * step
-        if way >= 1:
+def _off_feet(cone: WrenchCone, surface: Exact, F: Array, towards: Array) -> Array:
+    """The twist of a wrench F, or of the nearest on the way towards the straight one that is held; zero if none is."""
+
+    def twist(way: float) -> Array:
+        return surface.twist((1 - way) * F + way * towards)
+
+    low, high, step = 0.0, 0.0, MOVED
+    while not _held(cone, surface.support, twist(high)):
+        low, high, step = high, high + step, 2 * step
+        if high >= 1:
             return np.zeros(3)
-        V = surface.twist((1 - way) * F + way * towards)
-    return V
+    while high - low > FOUND:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _held(cone, surface.support, twist(middle)) else (middle, high)
+    return twist(high)
+
+
+def _held(cone: WrenchCone, support: Support, V: Array) -> bool:
+    """Whether a cone holds the friction of feet in all turns about points within OFF_CENTRE of that of a twist (3,).
+
+    Each foot takes the direction, among those that it has in such turns, that is worst for each face of the cone.
+    """
+    if V[2] == 0:
+        return True
+    points, weights = support.feet
+    u = velocity_at(V, points)
+    gaps = np.hypot(u[:, 0], u[:, 1]) / abs(V[2])
+    spread = np.where(gaps > OFF_CENTRE, np.arcsin(OFF_CENTRE / np.maximum(gaps, OFF_CENTRE)), np.pi)
+    # What a force at each foot adds to the height above each face, shape (faces, feet, 2).
+    lifts = cone.faces[:, None, :2] + cone.faces[:, None, 2:] * perpendicular(points) / cone.lever
+    angles = np.abs(np.arctan2(cross(lifts, u), np.sum(lifts * u, axis=2)))
+    heights = np.hypot(lifts[..., 0], lifts[..., 1]) * np.cos(np.minimum(np.pi, angles + spread))
+    return bool(np.min(heights @ weights) >= -CLOSED)
 
 
 def _tightest(lefts: Array, rights: Array, hand: Array, cost: Cost) -> tuple[Array, Array]:

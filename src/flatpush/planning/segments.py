@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contact.cone_twists import OFF_CENTRE
 from ..geometry import compose, exp, transform
 from ..geometry.pose import Array
 from ..problem import Arc, Pusher, PushSegment, Scene
@@ -83,10 +84,13 @@ def push_segment(
         # The farthest point of the object from the turning centre bows and accelerates the most.
         reach = far + float(np.hypot(*arc.step[:2])) / turn if turn > 0 else far
         ratio = max(1.0, reach / arc.tip_radius)
+        bend = float(np.sqrt(8 * SAG / reach))
+        if turn > 0 and len(fingers) == 2:
+            bend = min(bend, 2 * OFF_CENTRE / arc.tip_radius)
         t, fraction = law.samples(
             min(np.sqrt(8 * SAG / (pusher.acceleration * ratio)),
                 np.sqrt(8 * SAG_ANGLE * arc.tip_radius / pusher.acceleration)),
-            int(np.ceil(turn / np.sqrt(8 * SAG / reach))) + 1,
+            int(np.ceil(turn / bend)),
         )  # fmt: skip
         times.append(clock + t[1:])
         poses.append(compose(X, exp(fraction[1:, None] * arc.step)))

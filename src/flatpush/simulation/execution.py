@@ -11,11 +11,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact import Placement
-from ..geometry import compose, exp, pose_error, relative, transform
+from ..contact import Placement, WrenchCone
+from ..geometry import compose, exp, pose_error, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, Segment, SlideSegment, TableSegment, TransitSegment
-from ..problem.mechanics import named, placement_of
+from ..problem.mechanics import contacts_of, named, placement_of, surface_of, takes_cone, virtual_contact
 from .pieces import progress, turns_along
 from .plant import Plant
 from .slides import beside, plant_of_slides, rolled_out
@@ -28,6 +28,9 @@ SAME = 1e-9
 ROLLED = 1e-6
 # A limit may be passed by this part, and by what the rounding of places (in parts of their size) makes of it.
 SLACK, ROUNDING = 1e-6, 1e-15
+# What two fingers make between samples may miss their cone by this angle [°]: plans without a reserve miss it by up to
+# that, and slip a little; a turn about a foot that is left misses it by far more.
+MISSED = 1.0
 # Between samples the hand is looked at after every turn of so much [rad]: for what is in the way, and for how fast the
 # fingertips are, where a step of so little turn counts by its ends.
 TURN, CHORD = 0.02, 0.5
@@ -88,6 +91,8 @@ def _findings(scene: Scene, segments: Sequence[Segment]) -> Iterator[Finding]:
             yield from _starts(segment, pose, label)
             yield from _held(scene, segment, placements[segment.push], label)
             yield from _follows(segment, label)
+            if takes_cone(scene, len(segment.fingers)):
+                yield _kept(scene, segment, placements[segment.push], label)
             for arc in segment.arcs:
                 pose = compose(pose, exp(arc.duration * arc.twist))
             hands = [segment.fingers]
@@ -194,6 +199,28 @@ def _held(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
     for name, poses, near in (("samples", on, SAME), ("between samples", between, SAMPLING)):
         gaps = np.array([abs(outline.nearest(X[:2]).distance - radius) for X in poses])
         yield Finding(f"rolling fingertip off the outline, {name}", *_most(MM * gaps, "mm", MM * near, label))
+
+
+def _kept(scene: Scene, segment: PushSegment, placement: Placement, label: str) -> Finding:
+    """Two fingers that go straight from sample to sample turn the object about points beside those of its arcs.
+
+    At both ends of every step, under the model that was planned with; how far its wrench misses the fingers' cone.
+    """
+    toward = -virtual_contact(scene, placement).point
+    surface = surface_of(scene.object, scene.planning.model, toward / np.hypot(*toward))
+    cone, x = WrenchCone.of(contacts_of(scene, placement)), placement.pose
+    steps = np.diff(segment.pusher, axis=0)
+    least = np.ones(len(steps))
+    for yaw in (segment.pusher[:-1, 2], segment.pusher[1:, 2]):
+        at_hand = np.column_stack([rotate(x[2] - yaw, steps[:, :2]), steps[:, 2]])
+        moves = np.flatnonzero(np.any(at_hand != 0, axis=1))
+        twists = shift_twist(at_hand[moves], scene.object.cof - x[:2])
+        depths = cone.depth(surface.wrench(twists))
+        for k in np.flatnonzero(depths < 0):  # a turn just about a foot has many wrenches
+            depths[k] = cone.depths(surface.wrench_set(twists[k]))[1]
+        least[moves] = np.minimum(least[moves], depths)
+    missed = DEGREES * np.maximum(np.arcsin(np.clip(-least, -1, 1)), 0.0)
+    return Finding("force of two fingers outside their cone", *_most(missed, "°", MISSED, label))
 
 
 def _slides(plant: Plant, segment: SlideSegment, label: str) -> Iterator[Finding]:

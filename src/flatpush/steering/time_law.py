@@ -94,17 +94,16 @@ class Trapezoid:
         return min(self.speed, rising + step, max(falling - step, step, self.slow))
 
     def samples(self, step: float, count: int) -> tuple[Array, Array]:
-        """Times and fractions of the length: at most `step` seconds apart in the ramps, at least `count` pieces in all.
+        """Times and fractions of the length: at most `step` seconds apart in the ramps, and 1 / count of the length.
 
         Both include the ends exactly.
         """
         if self.length <= 0:
             return np.zeros(1), np.zeros(1)
         T, r = self.duration, self.ramp
-        n = max(1, int(np.ceil(r / step)))
-        m = max(1, int(np.ceil(count * max(0.0, T - 2 * r) / T)) + 1)
-        # A ramp that turns far is divided by the turn as well.
-        k = max(n, int(np.ceil(count * 0.5)) if self.length <= self.acceleration * r * r * (1 + 1e-9) else n)
+        most = count * self.top / self.length  # pieces in a second at the greatest speed
+        k = max(1, int(np.ceil(max(r / step, most * r))))
+        m = max(1, int(np.ceil(most * (T - 2 * r))))
         ramps = np.linspace(0.0, r, k + 1)
         cruise = np.linspace(r, T - r, m + 1) if T - 2 * r > 1e-9 * T else np.array([])
         t = np.sort(np.concatenate([ramps, cruise, T - ramps[::-1]]))

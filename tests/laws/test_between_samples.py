@@ -1,0 +1,93 @@
+"""What two fingers do straight between the samples of a plan: an object on feet turns as planned all the same."""
+
+import math
+
+import numpy as np
+import pytest
+
+import flatpush as fp
+from flatpush.contact import PointContact, WrenchCone, cone_twists
+from flatpush.contact.cone_twists import OFF_CENTRE
+from flatpush.friction import Exact, Support
+from flatpush.geometry import pose_error
+from flatpush.planning import segments
+
+# Objects whose tightest turns with a fifth in reserve go about a foot, with the side to push at, by (edge, along).
+RECTANGLE = fp.Object(
+    [(-0.03443, -0.01582), (0.03443, -0.01582), (0.03443, 0.01582), (-0.03443, 0.01582)],
+    Support.points([(0.02858, 0.00779), (-0.0127, -0.01044), (-0.007, 0.00948)], [1.41, 1.68, 1.21]),
+    0.39,
+)
+DISC = fp.Object(
+    fp.Outline.circle(0.02484),
+    Support.points([(-0.01825, -0.0015), (0.01145, 0.01393), (-0.00198, -0.01094)], [1.96, 1.35, 1.13]),
+    0.462,
+)
+CASES = {
+    "rectangle": (RECTANGLE, (1, 0.41511756), (-0.01838, 0.14529, math.radians(149.18))),
+    "disc": (DISC, (0, 0.42978069), (0.04481, 0.09188, math.radians(-166.55))),
+}
+
+
+def planned(case):
+    thing, (edge, along), start = CASES[case]
+    push = fp.Push("side", thing.outline.at(edge, along), 2, 0.018)
+    scene = fp.Scene(
+        thing, start, pusher=fp.Pusher(fingers=2, spacing=0.018, tip_radius=0.0025), pushes=(push,)
+    )
+    return fp.plan(scene)
+
+
+def off(plan):
+    """How far the object ends from the plan when its samples are executed [m, rad]."""
+    run = fp.simulate(plan, source="samples")
+    error = pose_error(run.final_pose, plan.pushes[-1].object[-1])
+    return math.hypot(*error[:2]), abs(error[2])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_samples_of_a_plan_take_an_object_on_feet_where_it_says(case):
+    plan = planned(case)
+    assert fp.verify(plan).ok
+    distance, angle = off(plan)
+    assert distance < 1e-6
+    assert angle < 1e-6
+
+
+def test_samples_too_far_apart_are_refused_though_their_straight_lines_are_near_the_arcs(monkeypatch):
+    monkeypatch.setattr(segments, "OFF_CENTRE", 1.0)
+    plan = planned("disc")
+    assert [claim.name for claim in fp.verify(plan).failed] == [
+        "executed: force of two fingers outside their cone"
+    ]
+    distance, angle = off(plan)
+    assert distance > 5e-5 or angle > math.radians(0.05)
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.2])
+def test_the_cone_holds_turns_about_all_points_near_the_planned_centres(margin):
+    """By the friction of each of the feet in turns about points around, on random feet."""
+    rng = np.random.default_rng(12)
+    around = np.stack([np.cos(np.linspace(0, 2 * np.pi, 24)), np.sin(np.linspace(0, 2 * np.pi, 24))], axis=1)
+    tried = beside = 0
+    for _ in range(40):
+        loads, feet = rng.uniform(0.2, 1.0, 4), rng.uniform(-0.02, 0.02, (4, 2))
+        surface = Exact(Support.points(feet - loads @ feet / np.sum(loads), loads))
+        mu = rng.uniform(0.2, 0.6)
+        contacts = [
+            PointContact([x + rng.uniform(-0.003, 0.003), -0.018], [0, 1], mu) for x in (-0.009, 0.009)
+        ]
+        try:
+            twists = cone_twists(contacts, surface, margin, np.array([[0.0, -0.0205]]))
+        except fp.NoDubinsReduction:
+            continue
+        cone = WrenchCone.of(contacts)
+        for V in twists[[0, 2]]:
+            centre = np.array([-V[1], V[0]]) / V[2]
+            for share in (0.3, 0.999):
+                for x, y in centre + share * OFF_CENTRE * around:
+                    assert cone.depth(surface.wrench(np.sign(V[2]) * np.array([y, -x, 1.0]))) >= -1e-9
+            gaps = np.hypot(*(surface.support.feet[0] - centre).T)
+            tried, beside = tried + 1, beside + bool(np.min(gaps) < 4 * OFF_CENTRE)
+    assert tried > 30
+    assert beside > 3
