@@ -70,7 +70,7 @@ def drawn(scene: fp.Scene, number: int, rng: np.random.Generator) -> list[fp.Sce
 
 def failures(plan: Any, scenes: list[fp.Scene]) -> tuple[int, int]:
     """Runs that do not stick throughout, and runs that do not end."""
-    rolled = roll(plan, scenes, "exact", "arcs")
+    rolled = roll(plan, scenes, "exact", "samples")
     return int(np.sum(~rolled.sticking)), sum(word != "completed" for word in rolled.outcomes)
 
 
@@ -89,7 +89,7 @@ def moved(scenes: list[fp.Scene], rng: np.random.Generator) -> list[fp.Scene]:
 
 def astray(plan: Any, scenes: list[fp.Scene]) -> tuple[int, float]:
     """Runs that do not end in the region that a plan states, and the farthest end, as a share of its half sides."""
-    rolled = roll(plan, scenes, "exact", "arcs")
+    rolled = roll(plan, scenes, "exact", "samples")
     errors = np.abs([plan.scene.goal_error(pose) for pose in rolled.final])
     box = np.array([*plan.certificate.set_end, 0.0]) + 1e-6
     ended = np.array([word == "completed" for word in rolled.outcomes])
