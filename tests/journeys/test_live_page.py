@@ -320,6 +320,75 @@ def test_sliders_and_numbers_say_the_same_and_change_the_plan(page):
     assert "pusher.spacing: the fingers overlap" in page.text("reason")
 
 
+def test_every_slider_and_choice_changes_its_own_number_of_the_scene_and_is_undone(page):
+    ids = page.js(
+        "return [...document.querySelectorAll('#sliders input[type=range], #sliders select')].map((n) => n.id)"
+    )
+    assert len(ids) == 9
+    for name in ids:
+        before, answers = page.scene, page.js("return flatpush.answered")
+        value = page.js(
+            "const n = document.getElementById(arguments[0]);"
+            "if (n.matches('select')) n.selectedIndex = (n.selectedIndex + 1) % n.options.length;"
+            "else n.value = Number(n.value) + 2 * Number(n.step);"
+            "if (!n.matches('select')) n.dispatchEvent(new Event('input'));"
+            "n.dispatchEvent(new Event('change'));"
+            "return n.value;",
+            name,
+        )
+        key = name.removesuffix("-slider").split("-")
+        changed = page.scene
+        for step in key:
+            changed = changed[step]
+        assert str(changed) == value, name
+        if name.endswith("-slider"):
+            assert page.js("return document.getElementById(arguments[0]).value", "-".join(key)) == value
+        page.wait(f"flatpush.answered > {answers}")
+        page.settle()
+        assert page.plan["status"] == "solved" or page.text("reason"), name
+        page.click("undo")
+        page.settle()
+        assert page.scene == before, name
+
+
+def test_every_key_that_is_listed_does_what_is_said_of_it(page):
+    from selenium.webdriver.common.keys import Keys
+
+    listed = page.js("return [...document.querySelectorAll('#keylist dt')].map((n) => n.textContent.trim())")
+    scene, now = "JSON.stringify(flatpush.model.scene)", "flatpush.player.now"
+    view = "document.getElementById('table').getAttribute('viewBox')"
+    focus = "document.activeElement.id"
+    # Of each line of the list: what is pressed in turn, and what each changes.
+    does = {
+        "Space": [(" ", "flatpush.player.playing")] * 2,
+        "← → ↑ ↓": [(k, scene) for k in (Keys.ARROW_LEFT, Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_DOWN)],
+        "R": [("r", scene), (Keys.SHIFT + "r" + Keys.NULL, scene), (Keys.ALT + "r" + Keys.NULL, scene)],
+        ", .": [(".", now), (",", now)],
+        "Home End": [(Keys.END, now), (Keys.HOME, now)],
+        "A": [("a", scene)],
+        "Delete": [(Keys.DELETE, scene)],
+        "P": [("p", "flatpush.hand.on"), (Keys.ESCAPE, "flatpush.hand.on")],
+        "C": [("c", "flatpush.feedback.on"), ("c", "flatpush.feedback.on")],
+        "M": [("m", "Boolean(flatpush.many.told)")],
+        "D": [("d", "Boolean(flatpush.table.sketch)"), (Keys.ESCAPE, "Boolean(flatpush.table.sketch)")],
+        "Tab": [(Keys.TAB, focus)],
+        "+ −": [("+", view), ("-", view)],
+        "F": [("+", view), ("f", view)],
+        "Ctrl Z": [(Keys.CONTROL + "z" + Keys.NULL, scene)],
+        "Ctrl Shift Z": [(Keys.CONTROL + Keys.SHIFT + "z" + Keys.NULL, scene)],
+        "?": [("?", "Boolean(document.querySelector('dialog[open]'))")],
+    }
+    assert sorted(listed) == sorted(does)
+    for line, presses in does.items():
+        if line in ("← → ↑ ↓", "R", "Tab"):
+            page.js("document.getElementById('start').focus()")
+        for key, what in presses:
+            before = page.js(f"return {what}")
+            page.press(key)
+            page.wait(f"JSON.stringify({what}) !== {json.dumps(json.dumps(before))}")
+            page.settle()
+
+
 def test_what_is_saved_can_be_planned_and_verified(page):
     import flatpush as fp
 
