@@ -174,7 +174,9 @@ def test_bounds_and_obstacles_are_kept_or_there_is_no_plan(triangle):
     assert kept.status == "solved"
     from shapely import Polygon
 
-    poses = kept.pushes[0].object
+    samples = kept.pushes[0].object
+    places = np.linspace(0, len(samples) - 1, 20 * len(samples))
+    poses = np.stack([np.interp(places, np.arange(len(samples)), column) for column in samples.T], axis=1)
     gaps = [Polygon(transform(X, triangle.outline.vertices)).distance(Polygon(beside)) for X in poses]
     assert kept.certificate.clearance == pytest.approx(min(gaps), abs=1e-4)
     assert fp.verify(kept).ok
