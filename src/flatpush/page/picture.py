@@ -57,7 +57,7 @@ def proved(certificate: Certificate) -> list[tuple[str, str]]:
         if value is not None:
             rows.append((name, _percent(value) + (" of μ" if name.startswith("both") else "")))
     if certificate.growth is not None:
-        rows.append(("a small error grows", f"{certificate.growth:.3g}-fold"))
+        rows.append(("small errors grow", f"{certificate.growth:.3g}-fold"))
     if certificate.sensitivity is not None:
         rows.append(("a start beside moves the end", f"{certificate.sensitivity['place']:.1f}-fold"))
     if certificate.clearance is not None:

@@ -48,9 +48,10 @@ export class Mechanics {
     this.follow();
     find("hint").dataset.of = "mechanics";
     find("hint").replaceChildren(...[...told.cones.map((cone) => [cone.colour, cone.name]), ["var(--drive)", "u, how the contact moves"], ...(told.areas.length ? [["#1f5fd0", "turning centres (+ left) that keep both fingers"], ["#c2189b", "(− right)"]] : []), ...(told.rays.length ? [["#1f5fd0", "turning centres (+ left)"], ["#c2189b", "(− right)"]] : [])].flatMap(([colour, name]) => {
-      const mark = document.createElement("i");
+      const mark = document.createElement("i"), key = document.createElement("span");
       mark.style.background = colour;
-      return [mark, name + " "];
+      key.append(mark, name);
+      return [key, " "];
     }), " · " + told.caption);
   }
 
