@@ -55,7 +55,7 @@ SECTIONS = (
         Section(
             f"fig{k}",
             f"Fig. {k} in the physics cell: {what}",
-            "The same by a two-finger tool in MuJoCo, with the authors' recorded runs where the data are given.",
+            "By an IRB 120 with two fingers in MuJoCo, with the authors' recorded runs where the data are given.",
         )
         for k, what in (
             (6, "a rectangle on three feet"),

@@ -1,11 +1,11 @@
 """The paper's robot experiment in the physics cell: [Zhou2017] Figs. 6-9, four objects, three starts, five runs each.
 
-Two fingers, open loop. Every run begins beside its nominal start as the recorded ones did: their offsets have the
-standard deviations OFF. A push of two fingers takes out errors of the angle and across the fingers, not along them. So
-the last push goes straight to the goal, where late contact costs nothing, and what comes before it pushes sides at
-right angles to that one. Not every pair of such plans bears starts that are off: fingers go over the crests of a curved
-side. So the contact simulator tries a pair before the cell does. Support and outline are as stated for the paper's
-objects; the feet of Fig. 6 are not known.
+Two fingers on the paper's arm, an IRB 120, open loop. Every run begins beside its nominal start as the recorded ones
+did: their offsets have the standard deviations OFF. A push of two fingers takes out errors of the angle and across the
+fingers, not along them. So the last push goes straight to the goal, where late contact costs nothing, and what comes
+before it pushes sides at right angles to that one. Not every pair of such plans bears starts that are off: fingers go
+over the crests of a curved side. So the contact simulator tries a pair before the cell does. Support and outline are as
+stated for the paper's objects; the feet of Fig. 6 are not known.
 
 Then the same starts with one finger under feedback: the horizon controller, learning, on poses that are late and noisy.
 """
@@ -25,6 +25,7 @@ from ..control.tracking.simulated_run import TrackedRun
 from ..errors import InputError
 from ..execution import DONE
 from ..execution import run as run_on
+from ..execution.arms import ARMS
 from ..execution.cell.robot import CellRobot
 from ..execution.run import Run, slowed
 from ..execution.simulated import Unknown
@@ -39,6 +40,7 @@ from .feedback import objects
 # Standard deviations of the start in 41 recorded runs, over both axes [m], and of its angle [rad].
 OFF = (0.001, float(np.deg2rad(1.2)))
 RUNS, SEED = 5, 0
+ARM = "irb120"  # or another of the cell's; "": the tool alone
 # Starts with which plans are tried in the contact simulator, so many at once; plans that bring these to more than
 # HOPELESS times the tolerance are tried no further.
 TRIED, AT_ONCE, HOPELESS = 12, 4, 3.0
@@ -181,13 +183,13 @@ def expected(both: tuple[Plan, ...], runs: int = TRIED, seed: int = SEED) -> flo
     return mean
 
 
-def cases(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[Case]:
+def cases(figure: str, runs: int = RUNS, seed: int = SEED, arm: str = ARM) -> Iterator[Case]:
     """The runs of a figure, one case for each start."""
     for number, start in enumerate(STARTS[figure]):
         both = plans(figure, start)
         starts, ends, ways, outcomes, seconds, begun = [], [], [], [], 0.0, process_time()
         for k in range(runs):
-            with CellRobot(both[0], beside(figure, number, k, seed)) as robot:
+            with _robot(both[0], beside(figure, number, k, seed), arm) as robot:
                 starts.append(robot.object)
                 done = [run_on(one, robot) for one in both]
                 ends.append(robot.object)
@@ -196,6 +198,11 @@ def cases(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[Case]:
                 seconds += robot.clock.now()
         cpu = process_time() - begun
         yield Case(both, np.array(starts), np.array(ends), tuple(outcomes), seconds, cpu, tuple(ways))
+
+
+def _robot(one: Plan, unknown: Unknown, arm: str) -> CellRobot:
+    """The cell for a plan, with an arm that stands where it usually does."""
+    return CellRobot(one, unknown, arm=ARMS[arm].placed() if arm else None)
 
 
 def way_of(done: Sequence[Run]) -> tuple[Array, ...]:
@@ -215,7 +222,9 @@ def beside(figure: str, number: int, k: int, seed: int) -> Unknown:
     return Unknown(noise=OFF, seed=int(drawn))
 
 
-def fed_back(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[tuple[Array, Array]]:
+def fed_back(
+    figure: str, runs: int = RUNS, seed: int = SEED, arm: str = ARM
+) -> Iterator[tuple[Array, Array]]:
     """For each start the same runs with one finger: errors (x, y, θ) [m, rad], (n, 3), and times (n,) [s]."""
     thing, places = objects()[list(STARTS).index(figure)]
     pushes = tuple(Push(name, thing.outline.nearest(place)) for name, place in places.items())
@@ -225,7 +234,7 @@ def fed_back(figure: str, runs: int = RUNS, seed: int = SEED) -> Iterator[tuple[
         one = plan(Scene(thing, pose, GOAL, Pusher(), pushes, planning=planning))
         errors, times = [], []
         for k in range(runs):
-            with CellRobot(one, unknown := beside(figure, number, k, seed)) as robot:
+            with _robot(one, unknown := beside(figure, number, k, seed), arm) as robot:
                 period, camera = robot.limits.period, Camera()
                 ticks = max(1, round(1 / (RATE * period)))
                 law = TrackedRun(
