@@ -176,7 +176,7 @@ def test_an_arm_that_is_named_is_a_limit(three_feet):
     assert far.limits.arm.tool == pytest.approx(0.12)
     for address, rule in (
         ("egm://h?arm=irb99", "no such arm"),
-        ("egm://h?arm=irb120&tool=-1", "0 mm long or more"),
+        ("egm://h?arm=irb120&tool=-1", "of at least 0"),
     ):
         with pytest.raises(fp.InputError, match=rule):
             open_robot(address, plan)

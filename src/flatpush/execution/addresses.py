@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from importlib.metadata import entry_points
-from math import isfinite, radians
+from math import inf, isfinite, radians
 from urllib.parse import parse_qsl, urlsplit
 
 from ..errors import InputError
@@ -13,6 +13,8 @@ from .arms import arm_named
 from .robot import Limits, Robot
 
 GROUP = "flatpush.robots"
+# No patience is shorter [s].
+SOON = 0.001
 # Name → function that makes one from an address and a plan; those of others come by the entry points of GROUP.
 BUILT_IN = {
     "sim": "flatpush.execution.simulated:sim",
@@ -64,11 +66,12 @@ class Address:
         where = (0.0, 0.0, 0.0, 0.0) if base is None else tuple(float(v) for v in base)
         return cls(text, parts.scheme, parts.hostname or "", port, where, options)  # type: ignore[arg-type]
 
-    def numbers(self, key: str, count: int, default: Sequence[float]) -> list[float]:
-        """The numbers of an option, shape (count,), in the unit of the option; the default where it is not given.
+    def numbers(self, key: str, count: int, default: Sequence[float], least: float = -inf) -> list[float]:
+        """The numbers of an option, shape (count,), none below the least, all in the unit of the option; the default
+        where it is not given.
 
         Raises:
-            InputError: for other than so many finite numbers.
+            InputError: for other than so many finite numbers, or one that is below the least.
         """
         self._used.add(key)
         if key not in self.options:
@@ -77,8 +80,9 @@ class Address:
             values = [float(part) for part in self.options[key].split(",")]
         except ValueError:
             values = []
-        if len(values) != count or not all(map(isfinite, values)):
+        if len(values) != count or not all(isfinite(value) and value >= least for value in values):
             what = "a number" if count == 1 else f"{count} numbers separated by commas"
+            what += f" of at least {least:g}" if isfinite(least) else ""
             raise InputError(f"{key} takes {what}", source=self.text, value=self.options[key])
         return values
 
@@ -104,23 +108,34 @@ class Address:
         """Limits, and those of the joints of the arm that the option arm names, `tool=MM` from flange to fingertips.
 
         Raises:
-            InputError: for an arm that is not known, or a tool that has no length.
+            InputError: for an arm that is not known, or a tool that is shorter than nothing.
         """
         self._used |= {"arm", "tool"}
         if "arm" not in self.options:
             return given
         arm = arm_named(self.options["arm"])
-        (tool,) = self.numbers("tool", 1, (1000 * arm.tool,))
-        if tool < 0:
-            raise InputError("a tool is 0 mm long or more", source=self.text, value=tool)
+        (tool,) = self.numbers("tool", 1, (1000 * arm.tool,), least=0)
         return replace(given, arm=replace(arm.placed(self.base), tool=tool / 1000))
 
-    def check_used(self) -> None:
+    def patience(self, connect: float, silence: float) -> tuple[float, float]:
+        """The options connect and silence [s], or these."""
+        (first,), (then,) = (
+            self.numbers(key, 1, (usual,), least=SOON)
+            for key, usual in (("connect", connect), ("silence", silence))
+        )
+        return first, then
+
+    def check_used(self, port: bool = True) -> None:
         """Refuses options that this robot does not have.
+
+        Args:
+            port: whether it has one.
 
         Raises:
             InputError: for the first of them.
         """
+        if self.port is not None and not port:
+            raise InputError(f"a port cannot be chosen for {self.name}", source=self.text, value=self.port)
         for key in self.options:
             if key not in self._used:
                 raise InputError(

@@ -222,10 +222,7 @@ def _load(robotware: int) -> "type[EGM]":
 def egm(address: Address, plan: Plan) -> EgmRobot:
     """`egm://HOST:PORT?connect=S&silence=S&robotware=7&arm=irb120`"""
     limits = address.limits(LIMITS)
-    (connect,), (silence,) = (
-        address.numbers("connect", 1, (CONNECT,)),
-        address.numbers("silence", 1, (SILENCE,)),
-    )
+    connect, silence = address.patience(CONNECT, SILENCE)
     robotware = round(address.numbers("robotware", 1, (6,))[0])
     limits = address.with_arm(limits)
     address.check_used()

@@ -208,10 +208,7 @@ def franka(address: Address, plan: Plan) -> FrankaRobot:
     if not address.host:
         raise InputError("a Franka robot has an address", value=address.text, hint="franka://HOST")
     limits = address.limits(LIMITS)
-    (connect,), (silence,) = (
-        address.numbers("connect", 1, (CONNECT,)),
-        address.numbers("silence", 1, (SILENCE,)),
-    )
-    address.check_used()
+    connect, silence = address.patience(CONNECT, SILENCE)
+    address.check_used(port=False)
     base = address.base if any(address.base) else None
     return FrankaRobot(address.host, base, limits, connect, silence)

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..errors import InputError
 from ..geometry import compose
 from ..geometry.pose import Array
 from ..problem import Plan
@@ -101,14 +102,19 @@ class Unknown:
     @classmethod
     def of(cls, address: Address) -> Self:
         """The options start=MM,MM,DEG, noise=MM,DEG, tool=MM, friction=μ and seed=N of an address."""
-        shift, spread = address.numbers("start", 3, (0, 0, 0)), address.numbers("noise", 2, (0, 0))
-        (tool,), (friction,) = address.numbers("tool", 1, (0,)), address.numbers("friction", 1, (np.nan,))
+        shift, spread = address.numbers("start", 3, (0, 0, 0)), address.numbers("noise", 2, (0, 0), least=0)
+        (tool,), (friction,), (seed,) = (
+            address.numbers(key, 1, usual, least=0)
+            for key, usual in (("tool", (0,)), ("friction", (np.nan,)), ("seed", (0,)))
+        )
+        if seed != round(seed):
+            raise InputError("seed takes a whole number", source=address.text, value=seed)
         return cls(
             (shift[0] / 1000, shift[1] / 1000, float(np.deg2rad(shift[2]))),
             (spread[0] / 1000, float(np.deg2rad(spread[1]))),
             tool / 1000,
             None if np.isnan(friction) else friction,
-            round(address.numbers("seed", 1, (0,))[0]),
+            round(seed),
         )
 
     def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -169,12 +175,12 @@ def home_of(plan: Plan) -> Array:
 def dry_run(address: Address, plan: Plan) -> DryRun:
     """`dry-run`"""
     limits = address.limits(Limits())
-    address.check_used()
+    address.check_used(port=False)
     return DryRun(home_of(plan), limits)
 
 
 def sim(address: Address, plan: Plan) -> SimRobot:
     """`sim?noise=MM,DEG&start=MM,MM,DEG&tool=MM&friction=μ&seed=N`"""
     limits, unknown = address.limits(Limits()), Unknown.of(address)
-    address.check_used()
+    address.check_used(port=False)
     return SimRobot(plan, unknown, limits=limits)

@@ -232,10 +232,7 @@ def ur(address: Address, plan: Plan) -> UrRobot:
     if not address.host:
         raise InputError("an arm of Universal Robots has an address", value=address.text, hint="ur://HOST")
     limits = address.limits(LIMITS)
-    (connect,), (silence,) = (
-        address.numbers("connect", 1, (CONNECT,)),
-        address.numbers("silence", 1, (SILENCE,)),
-    )
+    connect, silence = address.patience(CONNECT, SILENCE)
     limits = address.with_arm(limits)
-    address.check_used()
+    address.check_used(port=False)
     return UrRobot(address.host, address.base, limits, connect, silence)

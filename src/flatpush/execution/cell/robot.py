@@ -205,6 +205,6 @@ def mujoco(address: Address, plan: Plan) -> CellRobot:
     if address.host in HELD_BY:
         arm = ARMS[address.host].placed(address.base if any(address.base) else None)
     limits, unknown = address.limits(LIMITS), Unknown.of(address)
-    (table,) = address.numbers("table", 1, (np.nan,))
-    address.check_used()
+    (table,) = address.numbers("table", 1, (np.nan,), least=0)
+    address.check_used(port=False)
     return CellRobot(plan, unknown, table=None if np.isnan(table) else table, arm=arm, limits=limits)
