@@ -21,12 +21,14 @@ from simulated_tools import Cell, Ideal
 PERIOD, MISSED = 0.004, 25
 
 
-def message(cycle, pose, alive):
+def message(cycle, pose, alive, last):
     told = egm_pb2.EgmRobot()
     told.header.seqno, told.header.tm = cycle, round(1000 * PERIOD * cycle)
     told.header.mtype = egm_pb2.EgmHeader.MessageType.Value("MSGTYPE_DATA")
     place, turn = told.feedBack.cartesian.pos, told.feedBack.cartesian.orient
     place.x, place.y, place.z = (1000 * v for v in pose[:3])
+    if last is not None:
+        told.feedBack.joints.joints.extend([0.0] * 5 + [last])
     turn.u0, turn.u1, turn.u2, turn.u3 = 0.0, math.cos(pose[3] / 2), math.sin(pose[3] / 2), 0.0
     told.motorState.state = told.motorState.MOTORS_ON
     told.rapidExecState.state = (
@@ -57,6 +59,7 @@ def main():
     parser.add_argument(
         "--freeze", type=int, default=-1, help="says nothing any more from this answered cycle on"
     )
+    parser.add_argument("--last", type=float, help="angle of the last joint, which is told [°]")
     asked = parser.parse_args()
     arm = Cell(asked.plan, asked.start, PERIOD) if asked.plan else Ideal(asked.home, PERIOD)
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -85,7 +88,7 @@ def main():
         if 0 <= asked.freeze <= answered:
             select.select([sys.stdin], [], [], 0.05)
             continue
-        line.sendto(message(cycle, arm.pose, stopped < 0), ("127.0.0.1", asked.port))
+        line.sendto(message(cycle, arm.pose, stopped < 0, asked.last), ("127.0.0.1", asked.port))
         # Before anybody has answered it only calls.
         came = select.select([line], [], [], asked.patience if connected and stopped < 0 else 0.02)[0]
         target = twist = None

@@ -73,6 +73,8 @@ def kind(name):
 class Arm:
     """The tool, the registers, and the program that would run."""
 
+    last = 0.0  # angle of the last joint, which is told [rad]
+
     def __init__(self, tool):
         self.tool, self.before = tool, np.array(tool.pose)
         self.playing, self.state = False, READY
@@ -146,6 +148,8 @@ class Arm:
         if name in ("actual_TCP_speed", "target_TCP_speed"):
             rate = (pose - self.before) / PERIOD
             return [*rate[:3], 0.0, 0.0, rate[3]]
+        if name == "actual_q":
+            return [0.0] * 5 + [self.last]
         if name == "runtime_state":
             return [PLAYING if self.playing else STOPPED]
         if name == "output_int_register_0":
@@ -291,7 +295,11 @@ def main():
     parser.add_argument("--plan")
     parser.add_argument("--start", type=float, nargs=3, default=[0.0, 0.0, 0.0])
     parser.add_argument("--patience", type=float, default=0.5, help="with a command while it servoes [s]")
+    parser.add_argument(
+        "--last", type=float, default=0.0, help="angle of the last joint, which is told [rad]"
+    )
     asked = parser.parse_args()
+    Arm.last = asked.last
     tool = Cell(asked.plan, asked.start, PERIOD) if asked.plan else Ideal(asked.home, PERIOD)
     controller = Controller(asked.host, Arm(tool), asked.home, asked.patience)
     print(json.dumps({"host": asked.host}), flush=True)

@@ -64,6 +64,9 @@ def test_the_tool_is_where_it_was_asked_for(name, base):
         place = np.array(
             [c * pose[0] - s * pose[1] + x0, s * pose[0] + c * pose[1] + y0, pose[2] + z0 + 0.01]
         )
+        assert np.allclose(
+            arm.counted(pose + np.array([0, 0, 0, 4 * math.pi]), arm.joints(pose)[-1]), pose, atol=1e-9
+        )
         assert np.allclose(tool[:3, 3], place, atol=1e-9)
         assert np.allclose(tool[:3, 2], [0, 0, -1], atol=1e-9)
         assert math.remainder(

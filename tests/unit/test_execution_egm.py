@@ -173,6 +173,11 @@ def test_an_arm_that_is_named_is_a_limit(three_feet):
         with far as robot, pytest.raises(OutOfLimits, match=r"s: it is too far away from the arm"):
             run(plan, robot)
         assert controller.asked()["answered"] <= 1  # stop, which says where the tool is
+    for turns in (-1, 0, 1):
+        with Controller("--home", 0.42, 0.0, 0.03, 0.5, "--last", 360 * turns - 30) as controller:
+            address = f"egm://127.0.0.1:{controller.port}?arm=irb120"
+            with open_robot(address, plan, (0.36, 0.0, 0.0, 0.0)) as robot:
+                assert robot.state().pose[3] == pytest.approx(0.5 - 2 * math.pi * turns)
     assert far.limits.arm.tool == pytest.approx(0.12)
     for address, rule in (
         ("egm://h?arm=irb99", "no such arm"),

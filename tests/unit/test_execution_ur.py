@@ -5,6 +5,7 @@ import math
 import os
 import signal
 import socket
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,9 +16,10 @@ from tests.simulated_swing import swing
 
 import flatpush as fp
 from flatpush.execution import DONE, RobotFault, Target, open_robot, run
+from flatpush.execution.arms import ARMS
 
 pytest.importorskip("rtde_control", reason=extra("ur"))
-from flatpush.execution.ur import UrRobot
+from flatpush.execution.ur import LIMITS, UrRobot
 
 HOME = (-0.1, 0.02, 0.03, 0.5)
 SILENCE = 20.0  # on a shared machine: what is asserted are cycles
@@ -69,6 +71,18 @@ def test_poses_and_speeds_go_through_the_base_frame():
         assert twist[0] > 0.005
         assert abs(twist[1]) < 0.01 * twist[0]
         robot.stop()
+
+
+def test_the_last_joint_tells_how_often_the_hand_has_turned():
+    arm = ARMS["ur5e"].placed((0.0, 0.0, 0.0, 0.0))
+    angle = arm.joints(np.array([0.3, 0.1, 0.03, 0.5]))[-1]
+    for turns in (-1, 0, 1):
+        joint = ("--last", angle - 2 * math.pi * turns, "--home", 0.3, 0.1, 0.03, 0.5)
+        with (
+            Controller(*joint) as controller,
+            robot_at(controller.host, limits=replace(LIMITS, arm=arm)) as robot,
+        ):
+            assert robot.state().pose[3] == pytest.approx(0.5 + 2 * math.pi * turns)
 
 
 def test_a_controller_that_is_killed_or_freezes_ends_the_run():

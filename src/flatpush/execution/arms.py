@@ -87,12 +87,21 @@ class Arm:
 
     def yaws(self, pose: Array) -> tuple[float, float]:
         """Least and greatest yaw that the last joint allows at the place of a pose of E in W [rad]."""
+        one, other = (self._yaw(pose, float(end)) for end in self.limits[-1])
+        return min(one, other), max(one, other)
+
+    def counted(self, pose: Array, angle: float) -> Array:
+        """A pose of E in W, whose yaw is known up to whole turns, with those that the last joint at an angle has made
+        [rad]."""
+        near = self._yaw(pose, angle)
+        return np.array([*pose[:3], near + math.remainder(pose[3] - near, 2 * math.pi)])
+
+    def _yaw(self, pose: Array, angle: float) -> float:
+        """Of E in W at the place of a pose, with the last joint at an angle."""
         x, y, _, _, _ = self._wrist(pose)
-        azimuth, _, _, yaw = self.angles[-1]
-        ends = (
-            (self.limits[-1] - self.zeros[-1] - azimuth * self._first(x, y)) / yaw + self.turn - self.base[3]
-        )
-        return float(min(ends)), float(max(ends))
+        azimuth, _, _, rate = self.angles[-1]
+        turned = (angle - self.zeros[-1] - azimuth * self._first(x, y)) / rate
+        return float(turned + self.turn - self.base[3])
 
     def _first(self, x: float, y: float) -> float:
         """Azimuth of the vertical plane for a place of the tool in the base."""

@@ -19,6 +19,7 @@ from ..errors import InputError, MissingExtra
 from ..geometry import rotate
 from ..problem import Plan
 from .addresses import Address
+from .arms import Arm
 from .clock import CycleClock
 from .mount import TILT, in_base, on_table
 from .robot import Limits, RobotFault, State, Target
@@ -173,6 +174,9 @@ class EgmRobot:
         yaw = 2 * math.atan2(turn[2], turn[1])
         last = before.pose[3] if before is not None and np.isfinite(before.pose[3]) else 0.0
         pose = on_table(self._base, [v / 1000 for v in place], yaw, last)
+        arm, joints = self.limits.arm, found.joint_angles
+        if before is None and isinstance(arm, Arm) and joints is not None and len(joints) == len(arm.speeds):
+            pose = arm.counted(pose, math.radians(joints[-1]))
         twist = np.zeros(4)
         if before is not None and self.time > before.stamp:
             twist = (pose - before.pose) / (self.time - before.stamp)

@@ -169,6 +169,8 @@ class FrankaRobot:
     def _read(self, tool: np.ndarray, mode: str, before: State | None) -> State:
         last = 0.0 if before is None else float(before.pose[3])
         pose = on_table(self._arm.base, tool[:3, 3].tolist(), math.atan2(tool[1, 0], tool[0, 0]), last)
+        if before is None:
+            pose = self._arm.counted(pose, float(self._joints[0, -1]))
         twist = np.zeros(4) if before is None else before.twist
         if before is not None and self.time > before.stamp:
             twist = (pose - before.pose) / (self.time - before.stamp)

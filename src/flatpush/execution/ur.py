@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import InputError, MissingExtra
 from ..problem import Plan
 from .addresses import Address
+from .arms import Arm
 from .clock import CycleClock
 from .mount import TILT, in_base, on_table
 from .robot import Limits, RobotFault, State, Target
@@ -91,6 +92,9 @@ class UrRobot:
             self._receive = receive(self._host, rate)
             self._control = control(self._host, rate)
         self._begun = self._receive.getTimestamp()
+        if isinstance(self.limits.arm, Arm):
+            angle = self._receive.getActualQ()[-1]
+            self._yaw = float(self.limits.arm.counted(self.state().pose, angle)[3])
         self.newest()
         self._closing.clear()
         self._keeper = threading.Thread(target=self._keep, daemon=True)
