@@ -101,7 +101,9 @@ def test_a_home_out_of_reach_is_named_where_the_plan_is_not(short_plan):
         CellRobot(short_plan, arm=IRB.placed(), home=[0.5, 0.0, 0.03, 0.0])
 
 
-@pytest.mark.parametrize("name", ["irb120", pytest.param("ur5e", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["irb120", *(pytest.param(name, marks=pytest.mark.slow) for name in ("fr3", "ur5e"))]
+)
 def test_the_arm_ends_where_the_tool_alone_does(short_plan, name):
     model_of(name)
     with open_robot(f"mujoco://{name}?start=0.5,-0.5,1", short_plan) as robot:
