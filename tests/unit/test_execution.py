@@ -2,6 +2,8 @@
 
 import io
 import math
+import resource
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +14,7 @@ from tests.extras import extra
 import flatpush as fp
 from flatpush.control import Camera, PlanController, SimulatedSensor
 from flatpush.documents import load_robot_log
+from flatpush.errors import InputError
 from flatpush.execution import (
     DONE,
     Address,
@@ -305,6 +308,42 @@ def test_a_robot_that_fails_while_it_is_stopped_leaves_a_log(tmp_path):
     assert rows.times[-1] == pytest.approx(0.5)
     assert np.median(np.diff(rows.times)) == pytest.approx(0.02)
     assert not np.any(rows.seen)
+
+
+@pytest.mark.parametrize("ending", ["csv", "mcap"])
+def test_a_full_disk_ends_the_run_and_its_log_is_read(tmp_path, ending):
+    """Half a row stayed at the end of the file, and the error did not say of which."""
+    if ending == "mcap":
+        pytest.importorskip("mcap", reason=extra("export"))
+    path, free = tmp_path / f"run.{ending}", resource.getrlimit(resource.RLIMIT_FSIZE)
+    with DryRun([0.0, 0.0, 0.0, 0.0]) as robot:
+        stopped, before = robot.stop, signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        stops: list[float] = []
+        robot.stop = lambda: (stops.append(robot.clock.now()), stopped())
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000 if ending == "mcap" else 5_000, free[1]))
+        try:
+            ended = stream(Played(straight(start=(0, 0, 0, 0)), 0.01), robot, robot.clock, path)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, free)
+            signal.signal(signal.SIGXFSZ, before)
+    assert f"run.{ending}: this log cannot be written any more" in ended.outcome
+    assert 0.2 < ended.cycles[-1].time < 2.0
+    assert stops
+    times = load_robot_log(path).runs[0].times if ending == "csv" else stamps(path)
+    assert times[-1] == pytest.approx(ended.cycles[-1].time, abs=0.0301)
+    short = tmp_path / f"at-once.{ending}"
+    short.symlink_to("/dev/full")
+    with pytest.raises(InputError, match=r"this log cannot be written \(no space left on device\)"):
+        stream(Played(straight(start=(0, 0, 0, 0)), 0.01), robot, robot.clock, short)
+
+
+def stamps(path):
+    """Times of the targets in a bag [s]."""
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        messages = make_reader(file).iter_messages(["/flatpush/target"])
+        return [message.log_time / 1e9 for _, _, message in messages]
 
 
 @pytest.mark.parametrize("address", ["dry-run", "sim"])

@@ -191,6 +191,16 @@ def test_what_pushes_do_not_tell_is_said_and_stays_as_expected():
     assert any("turning radius of east" in text for text in summary.untold)
 
 
+def test_a_mirrored_picture_of_a_symmetric_outline_is_told_by_its_scatter(fitted):
+    """Fingers touch where they should, and numbers came out with small uncertainties and no other word."""
+    flip = [1, -1, -1]
+    motions = [replace(m, poses=m.poses * flip, tips=m.tips * flip[:2]) for m in pushed()]
+    fit = fit_motion(motions, EXPECTED, TIP)
+    assert fit.scatter > 5
+    assert any("a mirrored image" in text for text in summarise(fit, [], []).untold)
+    assert not any("scatter" in text for text in summarise(fitted, [], []).untold)
+
+
 def test_suggested_pushes_teach_what_they_promise():
     """The uncertainty after making the pushes is what was foretold; others leave more."""
     first = pushed(pushes=[(0, 0.6, 10), (2, 0.4, -30)])

@@ -94,8 +94,9 @@ def _lines(
     mm = 1000 * s.centre, 1000 * s.centre_sd
     odds = [(other.pressure.name, 0.5 * (other.evidence - fit.evidence)) for other in fit.others]
     others = [f"{name} less likely by e^{worse:.0f}" for name, worse in odds]
+    pushes = len(set(fit.seen.stretches.push))
     lines = [
-        f"{len(set(fit.seen.stretches.push))} pushes, {fit.stretches} stretches of 15 mm, the finger slid on"
+        f"{pushes} push{'es' * (pushes > 1)}, {fit.stretches} stretches of 15 mm, the finger slid on"
         f" {100 * fit.sliding:.0f} % of the way; noise {1000 * place:.2f} mm and {57.2958 * turn:.2f}°;"
         f" ends scatter {fit.scatter:.1f} times as much as that explains",
         "; ".join([f"support: {fit.pressure.name}", *others]),

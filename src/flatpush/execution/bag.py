@@ -4,6 +4,7 @@ import math
 import os
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Self
@@ -64,14 +65,28 @@ class WholeFile:
         """Nothing is written before it is committed."""
 
     def commit(self, end: bytes = END) -> None:
-        self._file.seek(self._at)
-        self._file.write(bytes(self._waiting) + end)
+        try:
+            self._put(bytes(self._waiting) + end)
+        except OSError:  # of a full disk; the last commit stands, in the room that it has
+            with suppress(OSError):
+                self._put(END if self._at else b"")
+                self._file.truncate(self._file.tell())
+            raise
         self._at += len(self._waiting)
         self._waiting.clear()
 
+    def _put(self, data: bytes) -> None:
+        self._file.seek(self._at)
+        while data:
+            data = data[self._file.write(data) :]
+
     def close(self) -> None:
-        self.commit(b"")
-        self._file.truncate(self._at)
+        with self._file:
+            self.commit(b"")
+            self._file.truncate(self._at)
+
+    def abandon(self) -> None:
+        """Closes it as it is."""
         self._file.close()
 
 
@@ -97,6 +112,11 @@ class McapLog:
             for topic, kind in TOPICS.items()
         }
         self._said, self._time = "", 0
+        try:
+            self._file.commit()
+        except OSError:
+            self._file.abandon()
+            raise
 
     def __enter__(self) -> Self:
         return self

@@ -3,19 +3,20 @@
 import io
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TextIO
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 
 from ..control import ClosedLoopRun
 from ..documents import check_writable, write_atomically
 from ..documents.robot_log import GROUPS, RAW
-from ..errors import InputError
+from ..errors import FlatpushError, InputError
 from ..geometry.pose import Array
 
 if TYPE_CHECKING:
+    from .bag import McapLog
     from .run import Cycle
 
 # Rows come at most so often [s]; recorded runs have 25 to 30 a second.
@@ -23,6 +24,10 @@ STEP = 0.02
 # A tool lower than this is on the table [m].
 ON_TABLE = 0.0005
 COLUMNS = (*GROUPS, *RAW, "vision_lost")
+
+
+class LogFault(FlatpushError):
+    """A log that cannot be written any more, as on a full disk; what it holds can be read."""
 
 
 class Log(Protocol):
@@ -45,13 +50,43 @@ class NoLog:
         pass
 
 
+class Text(Protocol):
+    """What takes text."""
+
+    def write(self, text: str, /) -> object: ...
+
+
+class WholeRows:
+    """A file of text in which all that is written at once stands, or none of it: a full disk cuts no row."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._file = Path(path).open("wb", buffering=0)  # noqa: SIM115  # closed by __exit__
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+    def write(self, text: str) -> None:
+        begun, left = self._file.tell(), text.encode()
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            with suppress(OSError):  # a device has no length
+                self._file.truncate(begun)
+                self._file.seek(begun)
+            raise
+
+
 class CsvLog:
     """The layout of recorded runs, which `documents.load_robot_log` and replay read; a row is a time on the table.
 
     Lengths in mm, angles in rad. Every row is written at once; what the tool does is told in comments.
     """
 
-    def __init__(self, file: TextIO, name: str) -> None:
+    def __init__(self, file: Text, name: str) -> None:
         self._file, self._name = file, name.replace(",", " ").replace('"', " ").replace("\n", " ")
         self._last, self._push, self._leg = -np.inf, 0, ""
         file.write(",".join(COLUMNS) + "\n")
@@ -120,14 +155,47 @@ def open_log(path: str | os.PathLike[str] | None, name: str) -> Iterator[Log]:
         yield NoLog()
         return
     check_log(path)
-    if Path(path).suffix.lower() == ".mcap":
-        from .bag import McapLog
+    with ExitStack() as open_:
+        try:
+            if Path(path).suffix.lower() == ".mcap":
+                from .bag import McapLog
 
-        with McapLog(path, name) as bag:
-            yield bag
-        return
-    with open(path, "w", encoding="utf-8", buffering=1, newline="\n") as file:
-        yield CsvLog(file, name)
+                bag = McapLog(path, name)
+                open_.callback(_close, bag)
+                book: Log = bag
+            else:
+                book = CsvLog(open_.enter_context(WholeRows(path)), name)
+        except OSError as error:
+            raise InputError(f"this log cannot be written ({_why(error)})", source=os.fspath(path)) from error
+        yield _Told(book, path)
+
+
+class _Told:
+    """A log that names itself where it cannot be written."""
+
+    def __init__(self, book: Log, path: str | os.PathLike[str]) -> None:
+        self._book, self._path = book, path
+
+    def write(self, cycle: "Cycle") -> None:
+        try:
+            self._book.write(cycle)
+        except OSError as error:
+            raise LogFault(
+                f"{os.fspath(self._path)}: this log cannot be written any more ({_why(error)})"
+            ) from error
+
+    def end(self, outcome: str) -> None:
+        with suppress(OSError):
+            self._book.end(outcome)
+
+
+def _close(bag: "McapLog") -> None:
+    with suppress(OSError):  # without the summary at its end it can be read as well
+        bag.__exit__(None, None, None)
+
+
+def _why(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 def check_log(path: str | os.PathLike[str]) -> None:

@@ -18,7 +18,7 @@ from ..problem import Plan
 from ..simulation import Claim, verify
 from .clock import Clock, WallClock
 from .course import SLACK, TURN, Course, alike, approach, in_range, planned, reach_of, within
-from .log import open_log
+from .log import LogFault, open_log
 from .robot import Limits, OutOfLimits, Robot, RobotFault, State, Target
 
 #: Outcome of a run in which the whole plan was made, open loop.
@@ -467,7 +467,7 @@ def stream(
                     told(cycle)
                 # A cycle that was late is not made up for: the next would come too soon.
                 due = max(due, now - 0.25 * period) + period
-        except RobotFault as fault:
+        except (RobotFault, LogFault) as fault:
             outcome = str(fault)
         finally:
             try:
