@@ -20,9 +20,11 @@ JUMP = 0.009  # [m]
 TURN_JUMP = 0.5  # [rad]
 # An object that was last seen so long before the end has no final pose [s].
 UNSEEN = 0.5
-# A stroke that moves the object so far ends with a finger that touches it within so much, or so much of its size, where
-# nothing is calibrated; a camera is at most so late. In one stroke of a run the object moves by more than STILL [m, s].
+# Once a stroke has moved the object so far a finger touches it within so much, or so much of its size, where nothing is
+# calibrated; a camera is at most so late. In one stroke of a run the object moves by more than STILL [m, s].
 PUSHED, NEAR, NEAR_SIZE, LATE, STILL = 0.01, 0.005, 0.1, 0.3, 0.001
+# That is looked at in these parts of the way, and at the end: a mirrored object stands well on the mirror's axis.
+PARTS = (0.25, 0.5, 0.75)
 # No camera misses so much of a push between two frames [m].
 LEAPS = 0.03
 # A hand that has gone no further than this still rests, or rests again [m].
@@ -160,17 +162,21 @@ class Recording:
             moved = max(moved, way)
             if way < PUSHED:
                 continue
-            tips = transform(inverse(poses[-1]), transform(hand[seen][-1], fingers))
-            gap = min(abs(thing.outline.nearest(tip).distance - tip_radius) for tip in tips)
-            late = times >= times[-1] - LATE
-            rushed = np.hypot(*np.ptp(hand[seen][late, :2], axis=0))
-            if gap > max(NEAR, NEAR_SIZE * thing.outline.size) + rushed:
-                raise InputError(
-                    f"line {lines[-1]}: the object was moved by {1000 * way:.0f} mm, and the nearest finger is"
-                    f" {1000 * gap:.1f} mm from touching its outline",
-                    source=run.name,
-                    hint="The scene of another object, a wrong size of the tag, or a mirrored image does that.",
-                )
+            far = np.hypot(*(poses - poses[0])[:, :2].T)
+            for k in sorted({len(far) - 1, *(int(np.argmax(far >= part * way)) for part in PARTS)}):
+                if far[k] < PUSHED:
+                    continue
+                tips = transform(inverse(poses[k]), transform(hand[seen][k], fingers))
+                gap = min(abs(thing.outline.nearest(tip).distance - tip_radius) for tip in tips)
+                late = (times >= times[k] - LATE) & (times <= times[k])
+                rushed = np.hypot(*np.ptp(hand[seen][late, :2], axis=0))
+                if gap > max(NEAR, NEAR_SIZE * thing.outline.size) + rushed:
+                    raise InputError(
+                        f"line {lines[k]}: the object was moved by {1000 * far[k]:.0f} mm, and the nearest finger is"
+                        f" {1000 * gap:.1f} mm from touching its outline",
+                        source=run.name,
+                        hint="The scene of another object, a wrong size of the tag, or a mirrored image does that.",
+                    )
         if moved < STILL:
             raise InputError(
                 f"the object is not pushed: it moves by {1000 * moved:.1f} mm at most",
