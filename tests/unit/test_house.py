@@ -6,8 +6,10 @@ import functools
 import importlib
 import inspect
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 from tests.mutants import entries, problems
@@ -385,6 +387,50 @@ ROOMS = (
 @pytest.mark.parametrize("module", ["flatpush", *(f"flatpush.{room}" for room in ROOMS)])
 def test_public_names_say_shape_unit_or_meaning_of_their_numbers(module):
     assert list(unsaid(module)) == []
+
+
+def raises(thing: FunctionType) -> bool:
+    """Whether a function refuses something by itself; what a dataclass makes has no source."""
+    if thing.__code__.co_filename == "<string>":
+        return False
+    tree = ast.parse(textwrap.dedent(inspect.getsource(thing)))
+    return any(
+        isinstance(part, ast.Raise) and called(part.exc).endswith(("Error", "Reduction", "Extra"))
+        for part in ast.walk(tree)
+    )
+
+
+def unexplained(module_name: str) -> Iterator[str]:
+    """Public names of a module without a docstring, or that refuse something and do not say so."""
+    module = importlib.import_module(module_name)
+    for name in module.__all__:
+        thing = getattr(module, name)
+        if not inspect.isclass(thing) and not inspect.isfunction(thing):
+            continue
+        members = vars(thing) if inspect.isclass(thing) else {name: thing}
+        kinds = thing.__mro__ if inspect.isclass(thing) else ()
+        for key, member in members.items():
+            of = getattr(member, "__func__", None) or getattr(member, "fget", None) or member
+            making = key in ("__init__", "__post_init__")
+            if (
+                not inspect.isfunction(of)
+                or "flatpush" not in of.__module__
+                or (key[0] == "_" and not making)
+            ):
+                continue
+            told = thing if making else of
+            docs = [
+                inspect.getdoc(told),
+                *(inspect.getdoc(vars(kind).get(key)) for kind in kinds if not making),
+            ]
+            doc = "\n".join(one for one in docs if one)
+            if not doc or (raises(of) and not re.search(r"Error|refuse|Refuse|NoDubins|Extra", doc)):
+                yield f"{name}.{key}" if kinds else name
+
+
+@pytest.mark.parametrize("module", ["flatpush", *(f"flatpush.{room}" for room in ROOMS)])
+def test_public_names_say_what_they_are_and_what_they_refuse(module):
+    assert list(unexplained(module)) == []
 
 
 def test_any_does_not_spread():

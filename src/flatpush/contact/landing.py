@@ -45,6 +45,9 @@ class StartRegion:
     Attributes:
         position: how far the origin of the frame O may be from its place, in any direction [m].
         angle: by which it may be turned to either side [rad].
+
+    Raises:
+        InputError: with the key, for a number that is negative or not finite, and an angle above 45°.
     """
 
     position: float = 0.0

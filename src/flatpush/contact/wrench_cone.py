@@ -190,6 +190,9 @@ def narrowed(contacts: Sequence[PointContact], margin: float) -> WrenchCone:
     It is that of contacts with (1 - margin) μ, each finger's force shared with the other, 1 - margin/2 to margin/2: the
     lighter finger keeps margin/2 of the load at least. Under parallel normals that is the cone of two contacts that
     stand at (1 - margin) × spacing.
+
+    Raises:
+        InputError: for a margin outside of [0, 1).
     """
     if not 0 <= margin < 1:
         raise InputError("the friction margin is at least 0 and less than 1", value=margin)

@@ -54,7 +54,11 @@ def read_mapping(
 
 def mapping_of(text: str, source: str = "", longest: int = MOST_ENTRIES) -> dict[str, object]:
     """The document in a text, as read_mapping reads it from a file of the name `source`; a list in it has at most
-    `longest` entries (a number)."""
+    `longest` entries (a number).
+
+    Raises:
+        InputError: for a text that is empty, cut off or no document of keys and values.
+    """
     kind = Path(source).suffix.lower()
     is_json = kind == ".json" or (kind not in (".yaml", ".yml") and text.lstrip().startswith("{"))
     value = None

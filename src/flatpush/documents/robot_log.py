@@ -64,6 +64,7 @@ class RobotRun:
 
     @property
     def name(self) -> str:
+        """Object, start and run, for messages."""
         return " ".join(part for part in (self.object, self.start, self.run) if part)
 
 

@@ -64,7 +64,11 @@ class Ellipsoid(LimitSurface):
         return finite(wrench, "a wrench is three finite numbers") @ self.matrix
 
     def wrench(self, twist: ArrayLike) -> Array:
-        """A⁻¹ V, scaled to H = 1, shape (..., 3)."""
+        """A⁻¹ V, scaled to H = 1, shape (..., 3).
+
+        Raises:
+            InputError: for a zero twist.
+        """
         V = finite(twist, "a twist is three finite numbers")
         if not np.all(np.any(V != 0, axis=-1)):
             raise InputError("a zero twist has no wrench of its own", value=twist)

@@ -56,6 +56,9 @@ class Exact(LimitSurface):
 
         Scaled to |(v, ℓ ω)| = 1, ℓ the gyration radius. Of a vertex (collinear feet): the rotation about the
         middle of the gap between two feet, or the translation.
+
+        Raises:
+            InputError: for a zero wrench.
         """
         F = _vectors(wrench, "a wrench")
         c, ell = self.support.centre, self._length

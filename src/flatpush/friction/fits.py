@@ -126,6 +126,9 @@ def fit_surface(
         length: characteristic length [m]; default: the gyration radius of a support; of another surface, torque over
             force it resists.
         regularisation: the weight λ, without unit; the data have no noise.
+
+    Raises:
+        InputError: for another kind.
     """
     if kind not in ("ellipsoid", "quartic"):
         raise InputError('a surface is fitted by an "ellipsoid" or a "quartic"', value=kind)

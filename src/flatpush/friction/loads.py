@@ -32,6 +32,7 @@ class LoadsFit:
 
     @property
     def surface(self) -> Exact:
+        """The exact limit surface of these loads."""
         return Exact(self.support)
 
 

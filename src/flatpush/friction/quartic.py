@@ -97,7 +97,11 @@ class Quartic(LimitSurface):
         return 12 * _contracted(self._tensor, self._balanced(wrench)) / np.outer(self._units, self._units)
 
     def wrench(self, twist: ArrayLike) -> Array:
-        """The F of least H(F) - V·F, scaled to H = 1, shape (..., 3)."""
+        """The F of least H(F) - V·F, scaled to H = 1, shape (..., 3).
+
+        Raises:
+            InputError: for a twist that is zero or not finite.
+        """
         V = finite(twist, "a twist is three finite numbers, not all zero")
         if V.shape[-1:] != (3,) or not np.all(np.any(V != 0, axis=-1)):
             raise InputError("a twist is three finite numbers, not all zero", value=twist)

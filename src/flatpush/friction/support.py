@@ -184,7 +184,11 @@ class Support:
         return h.reshape(V.shape[:-1])
 
     def curvature(self, twist: ArrayLike) -> Array:
-        """∇²h(V), the derivative of the wrench by the twist, shape (..., 3, 3). Resting feet are left out."""
+        """∇²h(V), the derivative of the wrench by the twist, shape (..., 3, 3). Resting feet are left out.
+
+        Raises:
+            InputError: for a zero twist.
+        """
         V = self._centred_twist(twist)
         flat = V.reshape(-1, 3)
         if not np.all(np.any(flat != 0, axis=1)):

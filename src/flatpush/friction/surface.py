@@ -43,7 +43,7 @@ class LimitSurface(ABC):
 
     @abstractmethod
     def value(self, wrench: ArrayLike) -> Array:
-        """H(F), shape (...)."""
+        """H(F), 1 on the surface, shape (...), of wrenches F about the origin of the frame, shape (..., 3)."""
 
     @abstractmethod
     def twist(self, wrench: ArrayLike) -> Array:

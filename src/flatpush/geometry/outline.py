@@ -87,7 +87,11 @@ class Outline:
 
     @classmethod
     def circle(cls, radius: float, centre: ArrayLike = (0.0, 0.0)) -> "Outline":
-        """A circle of the given radius [m] about a centre, shape (2,) in O [m]."""
+        """A circle of the given radius [m] about a centre, shape (2,) in O [m].
+
+        Raises:
+            InputError: for a radius that is not positive and finite.
+        """
         if not (is_finite(radius) and radius > 0):
             raise InputError("the radius of a circle is positive and finite", value=radius)
         middle = vector(centre, 2, "the centre of a circle is a point [x, y] of finite numbers")
@@ -95,6 +99,7 @@ class Outline:
 
     @property
     def is_circle(self) -> bool:
+        """Whether it is a circle rather than a polygon."""
         return self.radius > 0
 
     @cached_property
@@ -201,7 +206,11 @@ class Outline:
         return float(np.max(np.linalg.norm(self.vertices - p, axis=1)))
 
     def at(self, edge: int, along: float) -> OutlinePoint:
-        """The point at a place, 0 to 1, on an edge of a number (polygon), or at the angle 2π · along (circle)."""
+        """The point at a place, 0 to 1, on an edge of a number (polygon), or at the angle 2π · along (circle).
+
+        Raises:
+            InputError: for an edge that there is not, or a place that is not finite.
+        """
         if not is_finite(along):
             raise InputError("a place along an edge is a finite number", value=along)
         if self.is_circle:

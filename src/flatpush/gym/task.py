@@ -42,6 +42,9 @@ class Eyes:
         position, angle: standard deviations of the pose that is seen [m, rad].
         late: how many steps old frames are.
         dropped: the share of frames that do not come; the last one is seen again.
+
+    Raises:
+        InputError: for a negative standard deviation or age, or frames that never come.
     """
 
     position: float = 0.0
@@ -75,6 +78,9 @@ class PushTask:
         eyes: how the object is seen.
         rate: of decisions [Hz]. substeps: how many steps of the simulator each has.
         longest: how many decisions after which an episode is cut short.
+
+    Raises:
+        InputError: with the key, for a goal of any angle, or a value outside of what is said here.
     """
 
     scene: Scene

@@ -80,7 +80,11 @@ def push_option(
 
 
 def push_options(scene: Scene) -> tuple[PushOption, ...]:
-    """Every push of a scene whose pushes are listed."""
+    """Every push of a scene whose pushes are listed.
+
+    Raises:
+        InputError: for a scene whose pushes are "auto".
+    """
     if scene.pushes == "auto":
         raise InputError("the pushes are not listed yet", key="pushes", hint="See automatic_pushes.")
     return tuple(push_option(scene, push) for push in scene.pushes)

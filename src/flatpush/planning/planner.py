@@ -54,6 +54,9 @@ class Planner:
         controllability: whether the pushes move the object "free"-ly, by "detours", or not ("none").
         explored: after a search among obstacles, paths of the COF along edges of its tree, shape (m, k, 2) [m].
 
+    Raises:
+        InputError: for an object whose support is unknown, and pushes that cannot be placed.
+
     >>> import flatpush as fp
     >>> thing = fp.Object([(0.025, -0.0175), (0.025, 0.0175), (-0.025, 0.0175), (-0.025, -0.0175)], "outline")
     >>> planner = fp.Planner(fp.Scene(thing, (0.06, 0.02, 2.6), pusher=fp.Pusher(fingers=2, spacing=0.018)))
@@ -82,6 +85,7 @@ class Planner:
 
     @property
     def controllability(self) -> Controllability:
+        """Whether the pushes move the object "free"-ly, by "detours", or not ("none")."""
         return controllability([car_of(option) for option in self.usable])
 
     @property

@@ -130,10 +130,12 @@ class Plan:
 
     @property
     def pushes(self) -> tuple[PushSegment, ...]:
+        """The segments in which fingers stick, in order."""
         return tuple(s for s in self.segments if isinstance(s, PushSegment))
 
     @property
     def slides(self) -> tuple[SlideSegment, ...]:
+        """The segments in which a finger may slide, in order."""
         return tuple(s for s in self.segments if isinstance(s, SlideSegment))
 
     @property

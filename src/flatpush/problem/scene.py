@@ -30,6 +30,9 @@ class Uncertainty:
         offset: the fingers may stand so far along a straight side from where they should, either way [m].
         start: where the object may be about the scene's start; None: nothing is said, and each push is taken to begin
             within the offset of its place.
+
+    Raises:
+        InputError: with the key, for a share outside of [0, 1), coefficients that are no range, or a negative offset.
     """
 
     loads: float = 0.0
@@ -69,6 +72,9 @@ class Object:
         surface: a known limit surface about the centre of friction, in SI; it overrides the support's own.
         name: for people.
         uncertainty: how well pressure and friction are known; None: exactly.
+
+    Raises:
+        InputError: for a friction that is negative, not finite, or outside of the uncertainty's range.
     """
 
     outline: Outline
@@ -158,6 +164,10 @@ class Pusher:
         lift: height of a lifted transit [m].
         turn_rate: of the hand, at most, always [rad/s].
         travel_speed, travel_acceleration: while it is lifted, at most [m/s], [m/s²].
+
+    Raises:
+        InputError: with the key, for a number that is negative, not finite, or 0 where nothing would move, and for
+            fingers that overlap.
     """
 
     fingers: int = 1
@@ -210,6 +220,9 @@ class Push:
         at: the point of the outline, in O.
         fingers: how many push there, 1 or 2.
         spacing: between the centres of two fingertips [m].
+
+    Raises:
+        InputError: for another number of fingers, or a spacing that is negative or not finite.
     """
 
     name: str
@@ -287,6 +300,9 @@ class Planning:
         proof: of two fingers, where the object has an uncertainty.
         slides: whether one finger may push whatever the contact does: "auto", anywhere on the outline where no push of
             "auto" ones can steer; "join", also where some can, if that is cheaper; "never".
+
+    Raises:
+        InputError: with the key, for a value outside of what is said here.
     """
 
     model: Model = "exact"
@@ -358,6 +374,9 @@ class Scene:
         pusher: the fingers.
         pushes: places to push at, or "auto".
         workspace, planning: as their classes say.
+
+    Raises:
+        InputError: for angles beyond two turns, and for a start region with one finger or planar transits.
     """
 
     object: Object

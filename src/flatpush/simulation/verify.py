@@ -50,10 +50,12 @@ class Report:
 
     @property
     def ok(self) -> bool:
+        """Whether every claim holds."""
         return all(claim.ok for claim in self.claims)
 
     @property
     def failed(self) -> tuple[Claim, ...]:
+        """The claims that do not hold, in order."""
         return tuple(claim for claim in self.claims if not claim.ok)
 
 

@@ -65,6 +65,7 @@ class PushSketch:
 
     @property
     def steers(self) -> bool:
+        """Whether the push can steer; `refusal` says why not."""
         return not self.refusal
 
     @property

@@ -31,6 +31,9 @@ class Board:
 
     Attributes:
         columns, rows: of its inner corners, as numbers. square: side of a field [m].
+
+    Raises:
+        InputError: for fewer than 3 × 3 corners, or fields below 0.1 or above 1000 mm.
     """
 
     columns: int

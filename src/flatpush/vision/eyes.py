@@ -78,6 +78,9 @@ class DrawnEyes(AbstractSensor):
     Args:
         tracker: of one object. drawn: the camera that draws, with its tags. rate: of its frames [Hz].
         latency: from exposure to arrival [s]. rng: of what spoils the pictures.
+
+    Raises:
+        InputError: for a rate that is not positive, or a negative latency.
     """
 
     tracker: Tracker

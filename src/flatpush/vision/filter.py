@@ -37,6 +37,9 @@ class TwistFilter:
         acceleration, turning: standard deviations of the acceleration that is not foreseen [m/s²], [rad/s²].
         speed, spin: of the twist before anything is seen [m/s], [rad/s].
 
+    Raises:
+        InputError: for a standard deviation that is not positive.
+
     >>> track = TwistFilter().begin(0.0, [0.1, 0.0, 0.0], np.diag([1e-8, 1e-8, 1e-6]))
     >>> TwistFilter().at(track, 1.0).pose.tolist()
     [0.1, 0.0, 0.0]

@@ -85,6 +85,7 @@ class Tracker:
                 raise InputError("two objects have one tag", key="tag", value=number)
 
     def start(self) -> TrackerState:
+        """The state before the first picture: nothing is known of any object."""
         return TrackerState(objects={name: One() for name in self.tags})
 
     def step(self, state: TrackerState, picture: Picture, stamp: float) -> tuple[TrackerState, Seen]:

@@ -20,6 +20,9 @@ class Tag:
     Attributes:
         number: of the family tag36h11. size: side of its black border [m]. height: above the table [m].
         pose: X_OT of its middle in the object's frame, x right and y up as it is printed, (3,) [m, m, rad].
+
+    Raises:
+        InputError: with the key, for a number outside of the family, a size that is not positive, or a negative height.
     """
 
     number: int

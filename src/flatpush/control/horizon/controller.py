@@ -72,6 +72,9 @@ class HorizonController(AbstractController[HorizonState]):
         body, stale, noise: see AbstractController.
         sd: standard deviation of a frame's angle [rad], for learning.
         surroundings: what paths, landings and retreats keep clear of; None where nothing is in the way.
+
+    Raises:
+        InputError: for a rate, tolerance or number of landings that is not positive.
     """
 
     scene: Scene

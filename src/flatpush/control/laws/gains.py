@@ -45,7 +45,11 @@ class Gains:
 
     @classmethod
     def of(cls, frequency: ArrayLike, damping: ArrayLike = 1.0) -> "Gains":
-        """By natural frequency ω [rad/s] and damping ratio ζ: k_p = ω², k_d = 2ζω."""
+        """By natural frequency ω [rad/s] and damping ratio ζ: k_p = ω², k_d = 2ζω.
+
+        Raises:
+            InputError: for gains that are not positive and finite.
+        """
         w, z = np.asarray(frequency, dtype=float), np.asarray(damping, dtype=float)
         for name, value in (("frequency", w), ("damping", z)):
             if not np.all(np.isfinite(value) & (value > 0)):

@@ -212,6 +212,9 @@ class PostureController(_Linearised):
 
     Args:
         goal: X_WO (3,). speed: the flat speed it starts with [m/s]. tolerance: (m, rad) within which it has arrived.
+
+    Raises:
+        InputError: for a goal that is not finite, or a speed that is not positive.
     """
 
     goal: ArrayLike = (0.0, 0.0, 0.0)

@@ -49,6 +49,9 @@ class PathReference(AbstractReference):
         table: the path, shape (n, 6), see control.laws.formulas.
         speed: of the flat point [m/s]; with a time law, its largest.
         laws: of the flat point in each piece; none: the speed is constant.
+
+    Raises:
+        InputError: for no pieces, pieces without length, a speed that is not positive, or another number of laws.
     """
 
     table: Array

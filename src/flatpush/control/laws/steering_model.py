@@ -40,6 +40,10 @@ class SteeringModel:
         turns: whether the pusher turns with the object; if not, its round finger rolls on it.
         drift: how far the flat point moves to its left, per length along the heading, at turns per length evenly from
             -right to left, shape (n,): zero for an ellipsoidal limit surface, on which flatness is exact.
+
+    Raises:
+        InputError: for points that are not finite, a model that does not turn to both sides, and a flat point that is
+            not ahead of the contact.
     """
 
     flat_point: Array

@@ -95,7 +95,11 @@ class SteeringEstimate:
         return near and abs(self.rho - prior.rho) <= MOST_DEVIATIONS * prior.rho_sd and self.rho > 0
 
     def axle(self, point: ArrayLike) -> Axle:
-        """The axle of a contact, with what is known of it."""
+        """The axle of a contact, with what is known of it.
+
+        Raises:
+            InputError: for a contact at the centre of friction, which has none.
+        """
         p = np.asarray(point, dtype=float)
         d = self.cof - p
         r = float(np.hypot(*d))
@@ -198,7 +202,11 @@ class SteeringBelief:
         return replace(self, places=tuple(places), count=self.count + 1)
 
     def faded(self, share: float) -> "SteeringBelief":
-        """The belief with what was seen counting only by a share in [0, 1], for objects that wear or change."""
+        """The belief with what was seen counting only by a share in [0, 1], for objects that wear or change.
+
+        Raises:
+            InputError: for a share outside of [0, 1].
+        """
         if not 0 <= share <= 1:
             raise InputError("a share is between 0 and 1", value=share)
         faded = tuple(

@@ -150,6 +150,9 @@ def drive(
         sensor: it is shown the plant at every tick.
         duration: at most so long [s]. begin: time of the first tick [s].
         told: called at every tick with the time [s] and the controller's state.
+
+    Raises:
+        InputError: for a duration that is not positive and finite.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError("a duration is positive and finite", key="duration", value=duration)

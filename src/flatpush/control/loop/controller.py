@@ -63,7 +63,11 @@ class AbstractController(ABC, Generic[StateT]):
 
     @abstractmethod
     def start(self, time: float = 0.0) -> StateT:
-        """The state before the first measurement, at a time [s]."""
+        """The state before the first measurement, at a time [s].
+
+        Raises:
+            InputError: for a time that is not finite.
+        """
 
     @abstractmethod
     def act(self, state: StateT, time: float) -> tuple[StateT, Command]:
@@ -110,7 +114,11 @@ class AbstractController(ABC, Generic[StateT]):
         return self._commanded(*self.act(state, time), time)
 
     def check_stale(self) -> None:
-        """Refuses an age that makes no sense."""
+        """Refuses an age that makes no sense.
+
+        Raises:
+            InputError: for one that is not positive.
+        """
         if not (np.isfinite(self.stale) and self.stale > 0):
             raise InputError(
                 "the age at which a measurement is too old is positive", key="stale", value=self.stale

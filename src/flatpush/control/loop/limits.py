@@ -42,6 +42,9 @@ class Limits:
             [m/s²].
         size: of the object that is pushed [m]; 0: no frame is impossible.
         yaws: least and greatest yaw that the hand can have, whole turns counted [rad].
+
+    Raises:
+        InputError: for tips of another shape, or a limit that is not positive.
     """
 
     tips: Array

@@ -40,6 +40,9 @@ class LearningController(AbstractLawRunner[LearningState]):
         prior: what is believed before, in O.
         sd: standard deviations of a frame's position and angle [m, rad].
         stretch: the object moves at least so far between two observations [m].
+
+    Raises:
+        InputError: for standard deviations or a stretch that are not positive.
     """
 
     inner: TrackingController | PathController

@@ -128,6 +128,7 @@ class ReplanningController(AbstractController[ReplanningState]):
 
     @property
     def scene(self) -> Scene:
+        """The scene with its pushes listed."""
         return self.planner.scene
 
     @cached_property

@@ -93,6 +93,7 @@ class World:
 
     @property
     def empty(self) -> bool:
+        """Whether nothing can be touched: no obstacles and no bounds."""
         return not self.obstacles and not np.any(np.isfinite(self.bounds))
 
     @cached_property

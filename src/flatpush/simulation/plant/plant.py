@@ -158,6 +158,9 @@ class Plant:
         """The state after a time dt in which the hand moves with a velocity in W (vx, vy, yaw rate), (3,) or (k, 3).
 
         E's origin goes straight. Fingertips turn with their hand.
+
+        Raises:
+            InputError: for a negative time, or velocities that are not finite or of another shape.
         """
         if not (math.isfinite(dt) and dt >= 0):
             raise InputError("a time step is a finite number, 0 or more", value=dt)
@@ -218,6 +221,9 @@ class Plant:
             friction: of each run (n,). surfaces: of each, all of one kind and size. cofs: of each (n, 2).
             threads: how many; default: the machine's cores.
             push_out, body: as in follow. record: keeps the whole way of every run.
+
+        Raises:
+            InputError: for other shapes, or a negative friction.
         """
         objects = np.array(starts, dtype=float)
         if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
