@@ -187,6 +187,15 @@ def test_what_cannot_be_a_run_of_this_object_is_named(given, recordings, how, sa
         recordings[0].check(Object(Outline.circle(0.06)), FINGERS, TIP)
 
 
+def test_a_camera_map_that_cannot_be_right_is_told():
+    """A size of the tag that is wrong by 30 % was made up for by the map, without a word."""
+    assert not TRUE.doubt
+    assert (
+        "a scale of 0.77: a wrong size of the tag" in Parameters(np.array([-0.23, 0, 0, -0.23, 0, 0])).doubt
+    )
+    assert "mirrors" in Parameters(np.array([0, 0, 0, -2, 0, 0])).doubt
+
+
 def test_contacts_tell_the_camera_and_the_tag_without_an_end(given, recordings):
     found = contact_calibration(recordings, given)
     assert found.lag == pytest.approx(TRUE.lag, abs=0.01)

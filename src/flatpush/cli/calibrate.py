@@ -46,6 +46,8 @@ def command(
     with telling("calibrating"):
         found = calibrate(recordings, setup)
     p, left = found.parameters, found.left_out
+    if p.doubt:
+        typer.echo(f"warning: {p.doubt}", err=True)
     judged = (
         np.array([left[:, 0].mean(), left[:, 0].max(), left[:, 1].mean(), left[:, 1].max()])
         if len(left)

@@ -141,10 +141,11 @@ def _refuse_jumps(motion: Motion) -> None:
     if len(away):
         k = int(away[0])
         raise InputError(
-            f"line {motion.lines[k + 1]}: the object jumps by {1000 * step[k]:.1f} mm and {np.rad2deg(turn[k]):.1f}°"
-            " farther than the finger moves",
+            f"line {motion.lines[k + 1]}: the object jumps by {1000 * max(step[k], 0.0):.1f} mm farther than the finger"
+            f" moves, and by {np.rad2deg(turn[k]):.1f}°",
             source=motion.name,
-            hint="A tag that is mistaken for another, or seen wrongly, does that; leave such frames out.",
+            hint="A tag that is mistaken for another, or seen wrongly, does that (leave such frames out), or a wrong"
+            " unit.",
         )
 
 

@@ -57,6 +57,10 @@ class Setup:
         return list(dict.fromkeys(self.tag(name) for name in self.objects))
 
 
+# No camera that knows the size of its tag is off by such a share of the lengths.
+ODD_SCALE = 0.1
+
+
 @dataclass(frozen=True, eq=False)
 class Parameters:
     """What is calibrated; the default is what the drawing says.
@@ -74,6 +78,17 @@ class Parameters:
     inset: float = 0.0
     friction: float | None = None
     lag: float = 0.16
+
+    @property
+    def doubt(self) -> str:
+        """What a camera's map that cannot be right points to; else ""."""
+        area = float(np.linalg.det(np.eye(2) + np.reshape(self.camera[:4], (2, 2))))
+        if area <= 0:
+            return "the camera's map mirrors: x and y are exchanged, or the pictures are mirrored"
+        scale = float(np.sqrt(area))
+        if abs(scale - 1) > ODD_SCALE:
+            return f"the camera's map has a scale of {scale:.2f}: a wrong size of the tag or a wrong unit does that"
+        return ""
 
     def registration(self, setup: Setup, name: str) -> Registration:
         matrix = np.eye(2) + np.reshape(self.camera[:4], (2, 2))
