@@ -2,12 +2,12 @@
 
     python benchmarks/camera_sweep.py [SEEDS] [PART OF AN EXAMPLE'S NAME] [CONTROLLER] [FRAME RATE]
 
-All examples with two fingers and the triangle with one; controllers path and dfl, and horizon where it applies. "exact"
-and "late": without noise, the start as planned, with a frame in every tick and without delay, or 30 frames a second
-100 ms late. Then the default camera (0.3 mm, 0.3°, 100 ms late) at 15 to 500 frames a
-second, the start off by 0.5 mm in a random direction and by 0.5° to a random side, SEEDS (default 20) runs each; in the
-open loop the same starts are rolled out. Printed are, of the distances and angles off the goal, median, 95 % and worst,
-the outcomes, and of all runs the greatest share of each limit. Seeds and plans are the same each time.
+Examples with two fingers, and disc, t_shape and a triangle with one; controllers path and dfl, and horizon where it
+applies. "exact" and "late": without noise, the start as planned, with a frame in every tick and without delay, or 30
+frames a second 100 ms late. Then the default camera (0.3 mm, 0.3°, 100 ms late) at 15 to 500 frames a second, the start
+off by 0.5 mm in a random direction and by 0.5° to a random side, SEEDS (default 20) runs each; in the open loop the
+same starts are rolled out. Printed are, of the distances and angles off the goal, median, 95 % and worst, the outcomes,
+and of all runs the greatest share of each limit. Seeds and plans are the same each time.
 """
 
 import sys
