@@ -216,7 +216,9 @@ def _kept(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
         moves = np.flatnonzero(np.any(at_hand != 0, axis=1))
         twists = shift_twist(at_hand[moves], scene.object.cof - x[:2])
         depths = cone.depth(surface.wrench(twists))
-        for k in np.flatnonzero(depths < 0):  # a turn just about a foot has many wrenches
+        for k in np.flatnonzero(
+            (depths < 0) & surface.has_facets
+        ):  # a turn just about a foot has many wrenches
             depths[k] = cone.depths(surface.wrench_set(twists[k]))[1]
         least[moves] = np.minimum(least[moves], depths)
     missed = DEGREES * np.maximum(np.arcsin(np.clip(-least, -1, 1)), 0.0)
