@@ -8,6 +8,9 @@ import pytest
 from tests.journeys.test_bad_input import GOOD, NAN, refusal
 
 from flatpush.documents import check_outputs, load_pairs
+from flatpush.documents.calibration_file import load_calibration
+from flatpush.documents.camera_file import load_camera
+from flatpush.documents.surface_file import load_surface
 from flatpush.errors import InputError
 
 TEXTS: list[tuple[str, str, bytes, list[str]]] = [
@@ -72,6 +75,16 @@ def test_file_is_refused(tmp_path: Path, name: str, content: bytes, words: list[
     for word in words:
         assert word in str(error)
     assert len(str(error)) < 600
+
+
+@pytest.mark.parametrize("load", [load_camera, load_calibration, load_surface])
+def test_a_document_of_another_kind_is_told_before_its_keys(tmp_path: Path, load) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text('{"status": "solved", "flatpush": "plan/1"}')
+    with pytest.raises(
+        InputError, match=r"this flatpush reads \w+/1 here, got 'plan/1'. Is it the right file"
+    ):
+        load(path)
 
 
 def test_paths_that_cannot_be_read(tmp_path: Path) -> None:

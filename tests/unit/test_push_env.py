@@ -215,6 +215,14 @@ def test_what_cannot_be_is_told():
         PushTask(scene(goal=(0, 0, "free")))
     with pytest.raises(InputError, match="one finger"):
         PushPolicy(PushTask(scene(pusher=fp.Pusher(fingers=2, spacing=0.018))))
+    policy = PushPolicy(PushTask(scene()))
+    for state in (
+        np.zeros(5),
+        np.zeros((96, 96, 3)),
+        np.full(10, np.nan),
+    ):  # these ended in numpy's own words
+        with pytest.raises(InputError, match="a state is 10 finite numbers"):
+            policy.act(state)
     with pytest.raises(InputError, match="no room"):
         PushTask(scene(workspace=fp.Workspace((0, 0, 0.01, 0.01)))).drawn(np.random.default_rng(0))
     with pytest.raises(InputError, match="start, goal and hand"):

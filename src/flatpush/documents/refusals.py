@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -19,8 +19,21 @@ def checked(model: type[Model], document: object, source: str = "", prefix: str 
 
     Raises:
         InputError: for the first thing that is wrong; it tells how many more there are. In one mapping an
-            unknown key comes first, because a misspelt key is also a missing one.
+            unknown key comes first, because a misspelt key is also a missing one, and before all a document of
+            another kind.
     """
+    kind = model.model_fields.get("flatpush")
+    if kind is not None and isinstance(document, dict) and "flatpush" in document:
+        read, found = get_args(kind.annotation), document["flatpush"]
+        if read and found not in read:
+            hint = "Is it the right file?"
+            raise InputError(
+                f"this flatpush reads {read[0]} here",
+                source=source,
+                key=join(prefix, "flatpush"),
+                value=found,
+                hint=hint,
+            )
     try:
         return model.model_validate(document)
     except ValidationError as failure:

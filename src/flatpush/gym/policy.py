@@ -46,8 +46,19 @@ class PushPolicy:
         self._places = []
 
     def act(self, state: ArrayLike) -> Array:
-        """The action (2,) in a state."""
-        x, y, sine, cosine, *others = np.asarray(state, dtype=float).tolist()
+        """The action (2,) in a state.
+
+        Raises:
+            InputError: for what is no state of the task's.
+        """
+        given, names = np.asarray(state, dtype=float), self.task.names
+        if given.shape != (len(names),) or not np.all(np.isfinite(given)):
+            raise InputError(
+                f"a state is {len(names)} finite numbers: {', '.join(names)}",
+                value=state,
+                hint="Make the environment with observation='state'.",
+            )
+        x, y, sine, cosine, *others = given.tolist()
         seen, tip = np.array([x, y, np.arctan2(sine, cosine)]), np.array(others[:2])
         goal = np.array([*others[2:4], np.arctan2(others[4], others[5])])
         step = self.task.scene.pusher.speed / self.task.rate
