@@ -399,7 +399,10 @@ def test_surfaces(tmp_path: Path) -> None:
     [
         ({"flatpush": "surface/1"}, "either an ellipsoid or a quartic"),
         ({"flatpush": "surface/1", "ellipsoid": np.eye(3).tolist(), "quartic": [1] * 15}, "either"),
-        ({"flatpush": "surface/2", "ellipsoid": np.eye(3).tolist()}, "flatpush: this flatpush reads surface/1 here"),
+        (
+            {"flatpush": "surface/2", "ellipsoid": np.eye(3).tolist()},
+            "flatpush: this flatpush reads surface/1 here",
+        ),
         ({"flatpush": "surface/1", "elipsoid": []}, "Did you mean 'ellipsoid'"),
         ({"flatpush": "surface/1", "ellipsoid": (-np.eye(3)).tolist()}, "ellipsoid: .*positive definite"),
         ({"flatpush": "surface/1", "quartic": [-1.0] * 15}, "surface.json: quartic: "),

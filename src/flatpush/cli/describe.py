@@ -177,8 +177,8 @@ def _tell(data: dict[str, Any]) -> None:
                 typer.echo(
                     f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm"
                 )
-        radii = {k: ("—" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
-        typer.echo("  turning radius [mm]: " + ", ".join(f"{k} {r}" for k, r in radii.items()))
+        radii = {k: ("cannot steer" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
+        typer.echo("  turning radius [mm]: " + "; ".join(f"{k} {r}" for k, r in radii.items()))
         known = [r for k, r in push["radii"].items() if r is not None and k != MIDDLE]
         if known and max(known) > 1.5 * min(known):
             typer.echo(
