@@ -10,16 +10,16 @@ import numpy as np
 
 from ..control import AbstractController, AbstractSensor, ClosedLoopRun, ControllerState, Measurement
 from ..control.loop.frames import Seen
-from ..control.loop.limits import RESERVE, braking, turn_within
+from ..control.loop.limits import braking, turn_within
 from ..errors import InputError
 from ..geometry import compose
 from ..geometry.pose import Array
 from ..problem import Plan
 from ..simulation import Claim, verify
 from .clock import Clock, WallClock
-from .course import SLACK, TURN, Course, alike, approach, in_range, planned, reach_of, within
+from .course import SLACK, Course, alike, approach, in_range, planned, reach_of, within
 from .log import LogFault, open_log
-from .robot import Limits, OutOfLimits, Robot, RobotFault, State, Target
+from .robot import Limits, Robot, RobotFault, State, Target
 
 #: Outcome of a run in which the whole plan was made, open loop.
 DONE = "done"
@@ -29,7 +29,9 @@ MEASURED = 0.002
 WHOLE = 1e-6
 # Feedback of the tool that is kept to tell where it was when a frame was exposed [s].
 MEMORY = 2.0
-# One finger begins and ends its turn in the air within this time, less than it takes to come down [s].
+# One finger in the air has so much of its range left to both sides, where there is as much [rad]; few pushes turn more.
+RESERVE = math.pi
+# It begins and ends its turn in the air within this time, less than it takes to come down [s].
 GENTLE = 0.25
 # A controller has so many times the plan's duration, and so much more [s]: it looks, and may land again.
 PATIENCE, MORE = 3.0, 200.0
@@ -179,14 +181,12 @@ def run(
         if eyes is None:
             raise InputError("a controller needs eyes", hint="Give what sees the object.")
         patience = PATIENCE * plan.duration / speed + MORE
-        begins, turned, turn_rate = to_controller(plan, robot, speed), 0.0, 0.0
+        begins, turn_rate = to_controller(plan, robot, speed), 0.0
         if robot.limits.arm is not None and reach_of(plan) > 0:
-            turned = math.remainder(begins.poses[-1, 3] - plan.on_table[0].pusher[0, 2], TURN)
-            low, high = robot.limits.yaws(begins.poses[-1])
-            controller = controller.with_yaws((low - turned, high - turned))
+            controller = controller.with_yaws(robot.limits.yaws(begins.poses[-1]), alike(plan))
         elif robot.limits.arm is not None and plan.scene.pusher.turns:
             turn_rate = within(plan.scene.pusher, robot.limits, speed).turn_rate
-        motion = Controlled(begins, controller, eyes, robot, patience, turned, turn_rate)
+        motion = Controlled(begins, controller, eyes, robot, patience, turn_rate)
     names = (plan.scene.object.name,)
     return stream(motion, robot, time, log, told, names)
 
@@ -197,7 +197,12 @@ def way(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     Raises:
         OutOfLimits: as Course.check. RobotFault: for a robot that is not ready.
     """
-    return _way(plan, robot, speed, alike(plan))
+    tool = ready(robot).pose
+    pusher, reach = within(plan.scene.pusher, robot.limits, speed), reach_of(plan)
+    course = in_range(planned(plan, speed, float(tool[3])), robot.limits, pusher, reach, alike(plan))
+    whole = approach(tool, course.poses[0], pusher.lift, pusher, reach).then(course)
+    whole.check(robot.limits)
+    return whole
 
 
 def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
@@ -206,7 +211,7 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     Raises:
         OutOfLimits: as way, for the plan's own way too: a controller's is near it.
     """
-    whole = _way_under_feedback(plan, robot, speed)
+    whole = way(plan, robot, speed)
     tool, pusher = ready(robot).pose, within(plan.scene.pusher, robot.limits, speed)
     behind = compose(plan.on_table[0].pusher[0], [-2 * pusher.approach, 0.0, 0.0])
     yaw = whole.poses[np.argmax(whole.leg > 0), 3]
@@ -214,27 +219,6 @@ def to_controller(plan: Plan, robot: Robot, speed: float = 1.0) -> Course:
     found = approach(tool, above, pusher.lift, pusher, reach_of(plan))
     found.check(robot.limits)
     return found
-
-
-def _way_under_feedback(plan: Plan, robot: Robot, speed: float) -> Course:
-    """As way; a controller tells two fingers apart, so that they are exchanged for the whole plan or not at all."""
-    steps = alike(plan)
-    if reach_of(plan) == 0:
-        return _way(plan, robot, speed, steps)
-    try:
-        return _way(plan, robot, speed, (TURN,))
-    except OutOfLimits:
-        return _way(plan, robot, speed, (TURN,), steps[-1])
-
-
-def _way(plan: Plan, robot: Robot, speed: float, steps: Sequence[float], turned: float = 0.0) -> Course:
-    tool = ready(robot).pose
-    pusher, reach = within(plan.scene.pusher, robot.limits, speed), reach_of(plan)
-    course = planned(plan, speed, float(tool[3]) - turned)
-    course = in_range(course.part(0, len(course.times), turned), robot.limits, pusher, reach, steps)
-    whole = approach(tool, course.poses[0], pusher.lift, pusher, reach).then(course)
-    whole.check(robot.limits)
-    return whole
 
 
 def slowed(plan: Plan, limits: Limits, speed: float = 1.0) -> Plan:
@@ -276,7 +260,6 @@ class Controlled:
 
     Args:
         patience: the controller has so long [s]. The others are as of run.
-        turned: by how much the tool is turned against the controller's hand at first [rad].
         turn_rate: at which one finger, which is round, turns back into the range of its arm while it is in the air
             [rad/s], whatever the controller says; 0: the hand turns as the controller says.
 
@@ -291,7 +274,6 @@ class Controlled:
         eyes: AbstractSensor,
         robot: Robot,
         patience: float,
-        turned: float = 0.0,
         turn_rate: float = 0.0,
     ) -> None:
         self.patience, self.turn_rate = patience, turn_rate
@@ -313,8 +295,8 @@ class Controlled:
         self.seeing = eyes.start()
         self.control: ControllerState | None = None
         self.pose, self.twist, self.count = course.poses[-1].copy(), np.zeros(4), 0
-        # How fast that grows [rad/s].
-        self.turned, self.turning = turned, 0.0
+        # By how much the tool is turned against the controller's hand [rad], and how fast that grows.
+        self.turned, self.turning = 0.0, 0.0
         self.tool: list[tuple[float, Array]] = []
 
     def step(self, now: float, state: State) -> Wanted:

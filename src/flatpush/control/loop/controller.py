@@ -26,6 +26,7 @@ class ControllerState:
         outcome: "" while it is under way, "arrived", or why it gave up.
         ending: the outcome that it will have when the pusher stands.
         seen: the newest frame, and the commands since.
+        turned: by which the hand is taken to be turned farther than frames tell: its fingertips are alike [rad].
     """
 
     mode: str = "waiting"
@@ -33,6 +34,7 @@ class ControllerState:
     outcome: str = ""
     ending: str = ""
     seen: Seen = field(default_factory=Seen)
+    turned: float = 0.0
 
 
 StateT = TypeVar("StateT", bound=ControllerState)
@@ -74,9 +76,9 @@ class AbstractController(ABC, Generic[StateT]):
         """The state after a tick that begins at `time` [s], and what the pusher should do, from frames that are good
         and young; see `step`."""
 
-    def with_yaws(self, yaws: tuple[float, float]) -> Self:
-        """The same for a hand that has these yaws only, from the least to the greatest, whole turns counted [rad]; a
-        controller that cannot choose at which it lands is itself."""
+    def with_yaws(self, yaws: tuple[float, float], alike: tuple[float, ...]) -> Self:
+        """The same for a hand that has these yaws only, from the least to the greatest, whole turns counted, and whose
+        fingertips are alike after some turns, best first [rad]; a controller that cannot choose is itself."""
         return self
 
     def noticed(self, state: StateT, frame: Measurement) -> StateT:
@@ -97,6 +99,8 @@ class AbstractController(ABC, Generic[StateT]):
         if state.outcome or state.ending:
             return self._commanded(state, self._standing(state), time)
         if measurement is not None:
+            if state.turned != 0:
+                measurement = measurement.with_hand_turned(state.turned)
             wrong = refusal(measurement, state.seen, time, self.body, self.stale)
             before = state.seen.frame
             if not wrong and self.limits is not None and before is not None:

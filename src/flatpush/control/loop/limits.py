@@ -26,8 +26,8 @@ DEVIATIONS = 8.0
 # A pushed object runs at most so many times as fast as the finger, and it turns about a point that is at least this
 # share of its size away from the contact.
 FASTER, NEAREST = 2.0, 0.15
-# A hand that lands has so much of its range left to both sides, where there is as much [rad]; few pushes turn it more.
-RESERVE = math.pi
+# Feedback may turn a hand by so much more than is planned [rad].
+SPARE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,7 @@ class Limits:
             [m/s²].
         size: of the object that is pushed [m]; 0: no frame is impossible.
         yaws: least and greatest yaw that the hand can have, whole turns counted [rad].
+        alike: turns after which the fingertips are where they were, best first [rad].
 
     Raises:
         InputError: for tips of another shape, or a limit that is not positive.
@@ -55,6 +56,7 @@ class Limits:
     travel_acceleration: float
     size: float = 0.0
     yaws: tuple[float, float] = (-math.inf, math.inf)
+    alike: tuple[float, ...] = (2 * math.pi,)
 
     def __post_init__(self) -> None:
         tips = np.array(self.tips, dtype=float)
@@ -83,20 +85,30 @@ class Limits:
         """From E's origin to the farthest fingertip [m]."""
         return float(np.max(np.hypot(*self.tips.T)))
 
-    def landing(self, yaw: float, here: float) -> float:
-        """The yaw at which a hand lands that is `here`, whole turns from a given one: the short way, or where that
-        leaves too little of its range, nearest to the middle of it; all in W, whole turns counted [rad].
+    def landing(
+        self, yaw: float, here: float, swing: tuple[float, float], turned: float = 0.0
+    ) -> tuple[float, float]:
+        """The yaw at which a hand lands by the short way, and the turn that it makes besides where the push would leave
+        its range, both in W, whole turns counted [rad].
 
-        >>> tip, turn = np.zeros((1, 2)), 2 * math.pi
-        >>> arm = Limits(tip, 0.02, 0.1, 1.5, 0.1, 0.5, yaws=(-turn, turn))
-        >>> [round(math.degrees(arm.landing(math.radians(170), math.radians(here)))) for here in (0, 170, 300, -170)]
-        [170, 170, 170, 170]
-        >>> round(math.degrees(arm.landing(math.radians(-170), math.radians(175))))
-        -170
+        Args:
+            yaw: that of the contact, and here: that of the hand now [rad].
+            swing: how far the push turns the hand, at least and at most [rad].
+            turned: by which the hand is taken to be turned farther than it is [rad].
+
+        >>> arm = Limits(np.zeros((1, 2)), 0.02, 0.1, 1.5, 0.1, 0.5, yaws=(-5.0, 5.0))
+        >>> arm.landing(2.0, 0.0, (0.0, 1.0)), arm.landing(2.0, 3.0, (0.0, 1.0))
+        ((2.0, 0.0), (2.0, 0.0))
+        >>> short, turn = arm.landing(4.0, 3.5, (0.0, 1.0))
+        >>> round(short, 6), round(turn / math.pi)
+        (4.0, -2)
         """
         short = here + float(wrap_angle(yaw - here))
-        low, high = (end - short for end in self.yaws)
-        return short + turn_within(low + RESERVE, high - RESERVE, 2 * math.pi)
+        low, high = (
+            end - short - far + turned + spare
+            for end, far, spare in zip(self.yaws, swing, (SPARE, -SPARE), strict=True)
+        )
+        return short, turn_within(low, high, *self.alike)
 
     def kept(self, last: Command, climb: float, wanted: Command, yaw: float, dt: float) -> Command:
         """The command nearest to the wanted one, on the way from the last motion, that keeps to every limit.

@@ -1,6 +1,6 @@
 """What a controller is told and what it answers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,12 @@ class Measurement:
             and np.all(np.isfinite(self.object))
             and np.all(np.isfinite(self.pusher))
         )
+
+    def with_hand_turned(self, by: float) -> "Measurement":
+        """With the pusher turned farther by an angle [rad]."""
+        pusher = np.array(self.pusher, dtype=float)
+        pusher[2:] += by
+        return replace(self, pusher=pusher)
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,8 +189,8 @@ class PlanController(AbstractController[PlanState]):
         """X_WE a distance `before` [m] the contact of a push of that number, with the object at a pose X_WO."""
         return compose(pose, compose(self._model(push).pusher, [-before, 0.0, 0.0]))
 
-    def with_yaws(self, yaws: tuple[float, float]) -> Self:
-        return replace(self, limits=replace(self.limits, yaws=yaws))
+    def with_yaws(self, yaws: tuple[float, float], alike: tuple[float, ...]) -> Self:
+        return replace(self, limits=replace(self.limits, yaws=yaws, alike=alike))
 
     def start(self, time: float = 0.0) -> PlanState:
         if not np.isfinite(time):
@@ -238,8 +238,16 @@ class PlanController(AbstractController[PlanState]):
         assert state.known is not None
         pusher, pose = self.plan.scene.pusher, state.known.pose
         before, contact = (self.landing(state.push, pose, d) for d in (pusher.approach, 0.0))
-        before[2] = self.limits.landing(float(before[2]), float(here[2]))
+        yaws = self.plan.pushes[state.push].pusher[:, 2]
+        swing = float(np.min(yaws) - yaws[0]), float(np.max(yaws) - yaws[0])
+        before[2], turn = self.limits.landing(float(before[2]), float(here[2]), swing, state.turned)
         contact[2] = before[2]
+        if turn != 0:
+            # Fingertips that are alike: the hand is taken to be so much less turned, and turns as much more.
+            assert state.seen.frame is not None
+            seen = replace(state.seen, frame=state.seen.frame.with_hand_turned(-turn))
+            state = replace(state, seen=seen, turned=state.turned - turn)
+            here = here - np.array([0.0, 0.0, turn])
         stops = ([*here, pusher.lift], [*before, pusher.lift], [*before, 0.0], [*contact, 0.0])
         return replace(state, phase=Travelling(tuple(np.array(stop) for stop in stops), True), note="")
 

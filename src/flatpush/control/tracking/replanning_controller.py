@@ -123,8 +123,8 @@ class ReplanningController(AbstractController[ReplanningState]):
         limits = Limits.of(scene.pusher, tips, scene.object.outline.size)
         return cls(planner, tolerance, limits, rate, landings, 0.5 + latency, sd)
 
-    def with_yaws(self, yaws: tuple[float, float]) -> Self:
-        return replace(self, limits=replace(self.limits, yaws=yaws))
+    def with_yaws(self, yaws: tuple[float, float], alike: tuple[float, ...]) -> Self:
+        return replace(self, limits=replace(self.limits, yaws=yaws, alike=alike))
 
     @property
     def scene(self) -> Scene:
@@ -206,9 +206,10 @@ class ReplanningController(AbstractController[ReplanningState]):
         plan = Plan("solved", scene, first.cost, segments=segments)
         inner = PlanController.of(
             plan, "path", self.rate, sd=self.noise, stale=self.stale, tolerance=self.tolerance
-        ).with_yaws(self.limits.yaws)
+        ).with_yaws(self.limits.yaws, self.limits.alike)
         # It has been looked at: the push begins with a landing.
-        below, landing = replace(inner.start(time), phase=state.looking), state.landings + 1
+        below = replace(inner.start(time), phase=state.looking, turned=state.turned)
+        landing = state.landings + 1
         state = replace(state, inner=inner, below=below, margin=found.margin, landings=landing, stuck=0)
         state, command = self._follow(state, inner, below, time)
         return replace(state, note=f"landing {landing} at {plan.pushes[0].push}, {text}"), command
@@ -218,6 +219,7 @@ class ReplanningController(AbstractController[ReplanningState]):
     ) -> tuple[ReplanningState, Command]:
         """On with the push, and with what leads to it and away from it."""
         below, command = inner.act(replace(below, seen=state.seen), time)
+        state = replace(state, seen=below.seen, turned=below.turned)
         why, slips, stopped = below.outcome, state.slips, state.stopped
         if isinstance(below.phase, Pushing) and not why:
             if self._slipped(inner, below.phase):
