@@ -53,6 +53,17 @@ def vector(values: ArrayLike, size: int, rule: str, key: str = "") -> Array:
     return found
 
 
+def made_of(kind: type, value: object, load: str) -> None:
+    """Refuses what is no scene or plan, such as the path of a file of one.
+
+    Raises:
+        InputError: naming the function that reads such a file.
+    """
+    if not isinstance(value, kind):
+        name = kind.__name__.lower()
+        raise InputError(f"a {name} is asked, which fp.{load} reads from a file", value=value)
+
+
 def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is one real number; True, "1" and [1] are none."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

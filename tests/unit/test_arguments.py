@@ -94,3 +94,10 @@ def test_every_kind_of_real_number_is_one(value):
     assert fp.Support.disc(value).radius == 1.0
     assert fp.Pusher(fingers=1, speed=value).speed == 1
     assert fp.Scene(THING, (0, 0, value)).start_pose[2] == 1.0
+
+
+@pytest.mark.parametrize("call", [fp.plan, fp.verify, fp.simulate])
+def test_the_path_of_a_file_is_told_what_reads_it(call):
+    kind = "scene" if call is fp.plan else "plan"
+    with pytest.raises(InputError, match=rf"fp\.load_{kind}"):
+        call("a.json")

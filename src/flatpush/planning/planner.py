@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import made_of
 from ..compiling import clock
 from ..errors import FlatpushError, InputError
 from ..geometry.collision import Body, World, pose_clearance
@@ -351,7 +352,11 @@ def plan(scene: Scene) -> Plan:
 
     Returns:
         a Plan; where there is none, status "no_plan" and the reason of each push.
+
+    Raises:
+        InputError: for what is no Scene.
     """
+    made_of(Scene, scene, "load_scene")
     return Planner(moved_inside(scene)).plan()
 
 

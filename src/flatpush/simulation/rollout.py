@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import made_of
 from ..friction.surface import LimitSurface
 from ..geometry import inverse, transform
 from ..geometry.pose import Array
@@ -40,8 +41,9 @@ def simulate(
         source: the pusher's way: the plan's "arcs" exactly, or straight between its "samples".
 
     Raises:
-        InputError: for a plan without a solution, or with a push without motion.
+        InputError: for what is no Plan, for a plan without a solution, or with a push without motion.
     """
+    made_of(Plan, plan, "load_plan")
     plan.check_motion()
     scene = plan.scene
     if perturbation is not None:

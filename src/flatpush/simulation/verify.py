@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import made_of
 from ..documents.scene_digest import SceneDifference, scene_differences, scene_digest
 from ..errors import FlatpushError, InputError
 from ..problem import Certificate, Plan, Scene
@@ -67,8 +68,11 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
             Default: the plan's scene is believed.
 
     Raises:
-        InputError: for a document that holds no plan.
+        InputError: for what is no Plan or Scene, and for a Plan that is not solved.
     """
+    made_of(Plan, plan, "load_plan")
+    if scene is not None:
+        made_of(Scene, scene, "load_scene")
     if plan.status != "solved":
         raise InputError("there is no plan to verify", hint=plan.reason)
     trusted = [] if scene is None else [_difference(d) for d in scene_differences(plan.scene, scene)]
