@@ -1,9 +1,11 @@
 """What two fingers do straight between the samples of a plan: an object on feet turns as planned all the same."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.laws.test_table_sets import vertex
 
 import flatpush as fp
 from flatpush.contact import PointContact, WrenchCone, cone_twists
@@ -11,6 +13,7 @@ from flatpush.contact.cone_twists import OFF_CENTRE
 from flatpush.friction import Exact, Support
 from flatpush.geometry import pose_error
 from flatpush.planning import segments
+from flatpush.simulation.rollout import roll
 
 # Objects whose tightest turns with a fifth in reserve go about a foot, with the side to push at, by (edge, along).
 RECTANGLE = fp.Object(
@@ -91,3 +94,24 @@ def test_the_cone_holds_turns_about_all_points_near_the_planned_centres(margin):
             tried, beside = tried + 1, beside + bool(np.min(gaps) < 4 * OFF_CENTRE)
     assert tried > 30
     assert beside > 3
+
+
+@pytest.mark.slow
+def test_a_plan_for_a_set_of_tables_holds_when_its_samples_are_executed():
+    """On tables at corners of the set, with the least friction that its reserve allows for: planned for turns about the
+    centres of its arcs alone it kept both fingers along those and slipped between samples, on a third of the tables."""
+    outline = [(0.0291, 0.0094), (0.0037, 0.0291), (-0.0254, 0.0165), (-0.0293, 0.009), (0.0088, -0.028)]
+    feet, loads = [(0.0045, 0.0047), (-0.0128, 0.0055), (0.003, 0.0078)], np.array([0.364, 0.315, 0.321])
+    thing = fp.Object(outline, fp.Support.points(feet, loads), friction=0.4, uncertainty=fp.Uncertainty(0.2))
+    pusher = fp.Pusher(fingers=2, spacing=0.014)
+    plan = fp.plan(
+        fp.Scene(thing, (0.029, -0.009, 1.473), pusher=pusher, planning=fp.Planning(iterations=300))
+    )
+    assert plan.certificate.set_margin >= 0
+    rng, scenes = np.random.default_rng(0), []
+    for friction in np.repeat((0.32, 0.4), 20):
+        table = fp.Support.points(feet, vertex(loads, 0.2, rng.normal(size=3)))
+        worse = replace(thing, support=table, friction=float(friction), uncertainty=None)
+        scenes.append(replace(plan.scene, object=worse))
+    for source in ("arcs", "samples"):
+        assert np.all(roll(plan, scenes, "exact", source).sticking)

@@ -145,6 +145,28 @@ def test_no_table_of_the_set_slips_where_it_is_proved(name):
 
 
 @pytest.mark.parametrize("name", SUPPORTS)
+def test_a_turn_is_kept_about_all_points_near_its_centre(name):
+    """As straight lines between samples turn the object; the margin of the turn alone would promise more."""
+    rng = np.random.default_rng(9)
+    cone, near = WrenchCone.of(fingers()), 5e-4
+    tables, finer = (TableSet.of(SUPPORTS[name], 0.2, count) for count in (100, 200))
+    centres = rng.uniform(-0.06, 0.06, (2_000, 2))
+    angles = 2 * np.pi * np.arange(8) / 8
+    around = near * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+    def turns(middles):
+        sense = np.sign(middles[..., :1])  # the side is pushed upwards: to the left about a point on the left
+        return np.concatenate([-sense * middles[..., 1:], sense * middles[..., :1], -sense], axis=-1)
+
+    centres = centres[tables.margin(cone, turns(centres)) >= 0]
+    kept = replace(tables, aside=near).margin(cone, turns(centres)) >= 0
+    held = np.all([finer.margin(cone, turns(centres + way)) >= -1e-9 for way in around], axis=0)
+    assert np.all(held[kept])
+    assert not np.all(held)
+    assert np.sum(kept) > 0.5 * np.sum(held)
+
+
+@pytest.mark.parametrize("name", SUPPORTS)
 def test_the_greatest_mean_is_that_of_the_worst_loads_and_no_less_on_few_patches(name):
     """Of a linear function, whose mean over a patch is its value in the middle: loads differ within a patch as well."""
     fine, coarse = (TableSet.of(SUPPORTS[name], 0.3, count) for count in (4_000, 12))

@@ -222,7 +222,7 @@ def test_one_landing_leaves_no_more_than_is_said(support, friction):
     assert np.max(np.abs(errors[:, :2] @ side.normal)) <= 1e-6
     worst, (part,) = np.max(np.abs(errors[:, :2] @ side.along)), plan.certificate.tube
     along = part.travel * abs(np.tan(side.tilt(plan.pushes[0].arcs[0].twist[:2])))
-    assert 0.88 * (part.offset - along) <= worst <= part.offset
+    assert 0.85 * (part.offset - along) <= worst <= part.offset
 
 
 @pytest.mark.slow

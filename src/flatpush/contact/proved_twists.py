@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..errors import NoDubinsReduction
 from ..friction.support import Support
 from ..geometry.pose import Array
+from .cone_twists import OFF_CENTRE
 from .point_contact import PointContact
 from .set_twists import has_car, set_twists
 from .table_set import TableSet, side_along
@@ -45,7 +46,7 @@ class NothingProved(NoDubinsReduction):
 def proved_twists(
     support: Support, contacts: Sequence[PointContact], reserve: float, nominal: ArrayLike, bounds: Bounds
 ) -> Array:
-    """The twists of set_twists, (3, 3), for all tables and fingers within bounds.
+    """The twists of set_twists, (3, 3), for all tables and fingers within bounds, and turns that are off by OFF_CENTRE.
 
     Args:
         support: nominal.
@@ -58,7 +59,7 @@ def proved_twists(
         InputError: as TableSet.of and side_along.
         NothingProved: if every car is lost on some table; it names the bound that does it.
     """
-    tables = TableSet.of(support, bounds.loads)
+    tables = replace(TableSet.of(support, bounds.loads), aside=OFF_CENTRE)
 
     def within(b: Bounds) -> tuple[tuple[TableSet, ...], WrenchCone]:
         held = replace(tables, share=b.loads).held(side_along(contacts, b.offset), b.offset)

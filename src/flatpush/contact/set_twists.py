@@ -84,6 +84,7 @@ def _sketched(tables: TableSet) -> TableSet:
         points=few.points + tables.support.centre,
         reach=np.zeros(1),
         step=tables.step,
+        aside=tables.aside,
     )
 
 

@@ -79,6 +79,7 @@ class TableSet:
         points, weights: feet or centroids of patches, about the nominal centre of friction, shapes (n, 2) [m] and (n,).
         reach, along: of the patches, as friction.patches.Patches has them, shapes (n,) [m] and (n, 2).
         step: from its place in the hand to a neighbour's; margins hold for all places between [m].
+        aside: margins of a turn hold for turns about all points within it of that one's centre [m].
 
     >>> from flatpush.contact import PointContact
     >>> feet = Support.points([(-0.02, -0.01), (0.02, -0.01), (0.0, 0.02)])
@@ -95,6 +96,7 @@ class TableSet:
     reach: Array
     along: Array
     step: float = 0.0
+    aside: float = 0.0
 
     @classmethod
     def of(cls, support: Support, share: float, patches: int = PATCHES) -> "TableSet":
@@ -242,6 +244,9 @@ class TableSet:
         if self.step > 0:
             between = self._between(lever, distance, faces, arms) @ self.weights
             nominal, spread = nominal - between, spread + between
+        if self.aside > 0:
+            beside = self._beside(lever, faces, powers) @ self.weights
+            nominal, spread = nominal - beside, spread + beside
         return nominal, spread, size, powers
 
     def _spread(self, g: Array, first: Array, second: Array) -> Array:
@@ -262,6 +267,18 @@ class TableSet:
         turn = np.arcsin(np.clip(self.step / np.maximum(away, UNDER * self.radius), 0.0, 1.0))
         chord = np.where(away > self.step, 2 * np.sin(0.5 * turn), 2.0)[:, None]
         return np.minimum(second, 2 * np.minimum(far, far * chord + slope * self.step))
+
+    def _beside(self, lever: float, faces: Array, powers: "_Powers") -> Array:
+        """By how much g may fall while the turning centre is up to `aside` from its place, shape (m, k, n).
+
+        û turns by at most asin(aside / ρ) at a distance ρ from that; nearer, it may be anything.
+        """
+        room = self.reach + self.step
+        away = np.maximum(powers.distance - room, 0.0)
+        far = powers.arms + np.abs(faces[:, 2:]) / lever * room
+        turn = np.arcsin(np.minimum(self.aside / np.maximum(away, self.aside), 1.0))
+        chord = np.where(away > self.aside, 2 * np.sin(0.5 * turn), 2.0)[:, None]
+        return np.minimum(chord * far, powers.g + powers.first + far)
 
     def _wrenches(self, lever: float, unit: Array) -> Array:
         x, y = self.points.T
