@@ -9,10 +9,11 @@ from tests.laws.test_table_sets import vertex
 
 import flatpush as fp
 from flatpush.contact import PointContact, WrenchCone, cone_twists
-from flatpush.contact.cone_twists import OFF_CENTRE
+from flatpush.contact.cone_twists import MISSED, OFF_CENTRE
 from flatpush.friction import Exact, Support
 from flatpush.geometry import pose_error
 from flatpush.planning import segments
+from flatpush.problem.mechanics import surface_of
 from flatpush.simulation.rollout import roll
 
 # Objects whose tightest turns with a fifth in reserve go about a foot, with the side to push at, by (edge, along).
@@ -115,3 +116,27 @@ def test_a_plan_for_a_set_of_tables_holds_when_its_samples_are_executed():
         scenes.append(replace(plan.scene, object=worse))
     for source in ("arcs", "samples"):
         assert np.all(roll(plan, scenes, "exact", source).sticking)
+
+
+def test_a_quartic_that_bends_sharply_is_held_about_all_points_near_the_planned_centres():
+    """Quartics fitted to random feet, to within the degree that a plan without a margin misses."""
+    rng = np.random.default_rng(13)
+    angles = np.linspace(0, 2 * np.pi, 24)
+    square = [(-0.03, -0.03), (0.03, -0.03), (0.03, 0.03), (-0.03, 0.03)]
+    tried, least = 0, 1.0
+    for _ in range(12):
+        feet, loads = 0.025 * rng.uniform(-1, 1, (3, 2)), rng.uniform(0.5, 2.0, 3)
+        thing = fp.Object(square, Support.points(feet, loads), 0.25)
+        surface = surface_of(thing, "quartic", np.array([0.0, 1.0]))
+        contacts = [PointContact(np.array([x, -0.03]) - thing.cof, [0, 1], 0.25) for x in (-0.015, 0.015)]
+        try:
+            twists = cone_twists(contacts, surface, 0.25, np.array([[0.0, -0.0325]]) - thing.cof)
+        except fp.NoDubinsReduction:
+            continue
+        cone = WrenchCone.of(contacts)
+        for V in twists[[0, 2]]:
+            shifts = OFF_CENTRE * V[2] * np.stack([np.sin(angles), -np.cos(angles), 0 * angles], axis=1)
+            least = min(least, float(np.min(cone.depth(surface.wrench(V + shifts)))))
+            tried += 1
+    assert tried > 10
+    assert least >= -1.5 * math.sin(MISSED)  # it bends sharply between the directions that are looked at, too

@@ -1,12 +1,15 @@
 """The three motions of a two-finger push that turn an object tightest within the fingers' true composite cone."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import NoDubinsReduction
 from ..friction.exact import Exact
+from ..friction.quartic import Quartic
 from ..friction.support import Support
 from ..friction.surface import LimitSurface
 from ..geometry import cross, perpendicular, velocity_at
@@ -20,6 +23,11 @@ ON_FACE = 1
 # Fingers that go straight from sample to sample turn the object about points up to so far from the planned one [m]:
 # planning.segments samples turns so finely. Feet so near to the centre may then resist in any direction.
 OFF_CENTRE = 2.5e-4
+# In such turns a force may miss the cone by this angle [rad]: what motions without a margin miss it by, which slip a
+# little. A turn about a foot, or where a quartic bends as sharply, misses it by far more.
+MISSED = math.radians(1.0)
+# Directions [rad] in which the turning centre is off under a quartic, and beside the worst of them.
+AROUND, BESIDE = np.pi / 4 * np.arange(8), np.pi / 14 * np.array([-1.0, -0.5, 0.5, 1.0])
 # How far a wrench is moved at once, of its way to the straight one, and how exactly the end of that is found.
 MOVED, FOUND = 1 / 64, 1 / 1024
 # Choices that differ by less than this part are equal; the first is taken, so that rounding does not decide.
@@ -109,8 +117,8 @@ def _turns(
 ) -> tuple[Array, Array]:
     """Twists of wrenches on the narrowed cone, left turns (ω = 1) and right turns (ω = -1).
 
-    The wrench of an object on feet, whose friction changes much where the turning centre is off by little, is moved
-    towards the straight one until the whole cone holds it nevertheless.
+    A wrench whose turn the whole cone does not hold where its centre is off by little is moved towards the straight one
+    until it does.
     """
     rays = inner.wrenches[inner.order()]
     rays = rays / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
@@ -118,8 +126,8 @@ def _turns(
     parts = np.arange(between + 1) / (between + 1)
     wrenches = np.concatenate([(1 - s) * rays + s * nexts for s in parts])
     twists = surface.twist(wrenches)
-    if isinstance(surface, Exact) and surface.has_facets:
-        twists = np.array([_off_feet(cone, surface, F, towards) for F in wrenches])
+    for i in np.flatnonzero(~_held(cone, surface, twists)):
+        twists[i] = _nearer(cone, surface, wrenches[i], towards)
     kept = twists[:, 2] != 0
     turns = twists[kept] / np.abs(twists[kept, 2:])
     lefts, rights = turns[turns[:, 2] > 0], turns[turns[:, 2] < 0]
@@ -128,30 +136,44 @@ def _turns(
     return lefts, rights
 
 
-def _off_feet(cone: WrenchCone, surface: Exact, F: Array, towards: Array) -> Array:
-    """The twist of a wrench F, or of the nearest on the way towards the straight one that is held; zero if none is."""
+def _nearer(cone: WrenchCone, surface: LimitSurface, F: Array, towards: Array) -> Array:
+    """The twist of the nearest wrench on the way from F to the straight one that is held; zero if none is."""
 
     def twist(way: float) -> Array:
         return surface.twist((1 - way) * F + way * towards)
 
-    low, high, step = 0.0, 0.0, MOVED
-    while not _held(cone, surface.support, twist(high)):
-        low, high, step = high, high + step, 2 * step
+    low, high, step = 0.0, MOVED, MOVED
+    while not _held(cone, surface, twist(high)[None])[0]:
+        step *= 2
+        low, high = high, high + step
         if high >= 1:
             return np.zeros(3)
     while high - low > FOUND:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _held(cone, surface.support, twist(middle)) else (middle, high)
+        low, high = (low, middle) if _held(cone, surface, twist(middle)[None])[0] else (middle, high)
     return twist(high)
 
 
-def _held(cone: WrenchCone, support: Support, V: Array) -> bool:
-    """Whether a cone holds the friction of feet in all turns about points within OFF_CENTRE of that of a twist (3,).
+def _held(cone: WrenchCone, surface: LimitSurface, twists: Array) -> NDArray[np.bool_]:
+    """Whether a cone holds the turns about all points within OFF_CENTRE of those of twists (n, 3), shape (n,)."""
+    turns = twists[:, 2] != 0
+    held = np.ones(len(twists), dtype=bool)  # what is as smooth as an ellipsoid changes little so near
+    if isinstance(surface, Exact) and surface.has_facets:
+        held[turns] = [_held_by_feet(cone, surface.support, V) for V in twists[turns]]
+    elif isinstance(surface, Quartic) and turns.any():
 
-    Each foot takes the direction, among those that it has in such turns, that is worst for each face of the cone.
-    """
-    if V[2] == 0:
-        return True
+        def depths(directions: Array) -> Array:
+            off = OFF_CENTRE * np.stack([np.sin(directions), -np.cos(directions), 0 * directions], axis=-1)
+            return cone.depth(surface.wrench(twists[turns, None] + twists[turns, None, 2:] * off))
+
+        found = depths(np.broadcast_to(AROUND, (int(turns.sum()), len(AROUND))))
+        near = depths(AROUND[np.argmin(found, axis=1), None] + BESIDE)
+        held[turns] = np.minimum(found.min(axis=1), near.min(axis=1)) >= -math.sin(MISSED)
+    return held
+
+
+def _held_by_feet(cone: WrenchCone, support: Support, V: Array) -> bool:
+    """As _held, of feet: each takes the direction, of those that it has in such turns, that is worst for a face."""
     points, weights = support.feet
     u = velocity_at(V, points)
     gaps = np.hypot(u[:, 0], u[:, 1]) / abs(V[2])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact import Placement, WrenchCone
+from ..contact.cone_twists import MISSED
 from ..geometry import compose, exp, pose_error, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, Segment, SlideSegment, TableSegment, TransitSegment
@@ -28,9 +29,6 @@ SAME = 1e-9
 ROLLED = 1e-6
 # A limit may be passed by this part, and by what the rounding of places (in parts of their size) makes of it.
 SLACK, ROUNDING = 1e-6, 1e-15
-# What two fingers make between samples may miss their cone by this angle [°]: plans without a reserve miss it by up to
-# that, and slip a little; a turn about a foot that is left misses it by far more.
-MISSED = 1.0
 # Between samples the hand is looked at after every turn of so much [rad]: for what is in the way, and for how fast the
 # fingertips are, where a step of so little turn counts by its ends.
 TURN, CHORD = 0.02, 0.5
@@ -222,7 +220,7 @@ def _kept(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
             depths[k] = cone.depths(surface.wrench_set(twists[k]))[1]
         least[moves] = np.minimum(least[moves], depths)
     missed = DEGREES * np.maximum(np.arcsin(np.clip(-least, -1, 1)), 0.0)
-    return Finding("force of two fingers outside their cone", *_most(missed, "°", MISSED, label))
+    return Finding("force of two fingers outside their cone", *_most(missed, "°", DEGREES * MISSED, label))
 
 
 def _slides(plant: Plant, segment: SlideSegment, label: str) -> Iterator[Finding]:
