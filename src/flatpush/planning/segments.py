@@ -90,7 +90,7 @@ def push_segment(
         t, fraction = law.samples(
             min(np.sqrt(8 * SAG / (pusher.acceleration * ratio)),
                 np.sqrt(8 * SAG_ANGLE * arc.tip_radius / pusher.acceleration)),
-            int(np.ceil(turn / bend)),
+            int(np.ceil(turn / bend)) + 1,
         )  # fmt: skip
         times.append(clock + t[1:])
         poses.append(compose(X, exp(fraction[1:, None] * arc.step)))

@@ -103,7 +103,7 @@ class Trapezoid:
         T, r = self.duration, self.ramp
         most = count * self.top / self.length  # pieces in a second at the greatest speed
         k = max(1, int(np.ceil(max(r / step, most * r))))
-        m = max(1, int(np.ceil(most * (T - 2 * r))))
+        m = max(0, int(np.ceil(most * (T - 2 * r)))) + 1
         ramps = np.linspace(0.0, r, k + 1)
         cruise = np.linspace(r, T - r, m + 1) if T - 2 * r > 1e-9 * T else np.array([])
         t = np.sort(np.concatenate([ramps, cruise, T - ramps[::-1]]))
