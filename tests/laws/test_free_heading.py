@@ -46,7 +46,7 @@ def _cost(fleet: Fleet, word: str, amounts: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("timed", [False, True])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(data=st.data(), x=number, y=number, start=st.tuples(number, number, number))
 def test_no_heading_is_cheaper(
     timed: bool, data: st.DataObject, x: float, y: float, start: tuple[float, float, float]
