@@ -112,7 +112,7 @@ def test_two_fingers_on_an_arc(name, place, centre, kept):
 @pytest.mark.slow
 def test_the_friction_that_a_plan_leaves_in_reserve_is_what_it_can_lose():
     """The certificate's friction margin m of a designed plan: with a little more than (1 - m) μ between fingers and
-    object it goes with the hand, with a tenth less it slides along them by more than a millimetre."""
+    object it goes with the hand, with a tenth less it slides along them by more than a millimetre, as in the plant."""
     thing, mu = THINGS["rectangle"], THINGS["rectangle"].friction
     pushes = (fp.Push("below", thing.outline.nearest((0.0, -0.0175)), 2, 0.018),)
     pusher = fp.Pusher(fingers=2, spacing=0.018, tip_radius=RADIUS)
@@ -121,11 +121,14 @@ def test_the_friction_that_a_plan_leaves_in_reserve_is_what_it_can_lose():
     assert 0.19 < margin < 0.5
     hands, start = np.asarray(segment.pusher), np.asarray(segment.object[0])
     grasp = relative(start, hands[0])
-    for share, least, most in ((1.05, 0.0, 0.25e-3), (0.9, 1e-3, 3e-3)):
+    # Soft contacts creep besides by some 0.15 mm on this way of 63 mm, more while they slide.
+    for share, least, creep in ((1.05, 0.0, 0.25e-3), (0.9, 1e-3, 0.3e-3)):
         weaker = fp.Object(thing.outline, thing.support, share * (1 - margin) * mu)
         ends = Reference(weaker, np.asarray(segment.fingers), RADIUS, BOXES["rectangle"]).follow(start, hands)
         off = pose_error(relative(ends[-1], hands[-1]), grasp)
+        end = Plant(weaker, segment.fingers, RADIUS).follow(start, hands).object[-1]
+        slid = pose_error(relative(end, hands[-1]), grasp)
         print(f" {share:.2f} of (1 - m) μ: {1000 * off[0]:.3f} mm along the edge, {np.rad2deg(off[2]):.4f}°")
-        # Soft contacts creep by some 0.15 mm on this way of 80 mm.
-        assert least <= abs(off[0]) <= most
+        assert abs(off[0]) >= least
+        assert abs(off[0] - slid[0]) <= creep
         assert abs(off[2]) < ANGLE

@@ -12,7 +12,7 @@ from ..geometry.pose import Array
 from ..planning import PushDescription
 from ..planning.options import push_option
 from ..problem import Arc, Scene
-from ..problem.mechanics import contacts_of, surface_of, takes_cone, virtual_contact
+from ..problem.mechanics import contacts_of, surface_at, takes_cone, virtual_contact
 from ..view import palette, words
 from ..view.push_figure import REGION, caption, sense
 from ..view.push_sketch import PushSketch
@@ -109,7 +109,7 @@ def _surface(
     placement = described.option.placement
     assert placement is not None
     contact = virtual_contact(scene, placement)
-    surface = surface_of(scene.object, scene.planning.model, -contact.point / np.hypot(*contact.point))
+    surface = surface_at(scene, contact)
     scale = np.abs(np.diag(surface.wrench(np.eye(3))))
     two = takes_cone(scene, len(placement.tips))
     edge = _cone_on(surface, contacts_of(scene, placement) if two else (contact,))

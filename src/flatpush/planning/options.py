@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..contact import Placement, two_point_sticks
 from ..errors import FlatpushError, InputError
 from ..geometry import compose, shift_twist
@@ -13,7 +11,7 @@ from ..problem.mechanics import (
     contacts_of,
     placement_of,
     proved_for_set,
-    surface_of,
+    surface_at,
     takes_cone,
     true_surface,
     virtual_contact,
@@ -52,9 +50,7 @@ def push_option(
         placement = placement_of(scene, push)
         _check_landing(scene, placement)
         contact = virtual_contact(scene, placement)
-        distance = float(np.hypot(*contact.point))
-        towards = -contact.point / distance if distance > 0 else contact.normal
-        surface = surface_of(scene.object, model or scene.planning.model, towards)
+        surface = surface_at(scene, contact, model)
         if push.fingers == 1 and proved_for_set(scene):
             raise InputError(
                 "one finger cannot be proved for a set of tables",

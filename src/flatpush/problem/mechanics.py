@@ -129,6 +129,13 @@ def surface_of(thing: Object, model: Model, direction: Array) -> LimitSurface:
     return _fitted(thing, model)
 
 
+def surface_at(scene: Scene, contact: PointContact, model: Model | None = None) -> LimitSurface:
+    """The limit surface of a model (default: the scene's) for pushes at a contact in B; see surface_of."""
+    distance = float(np.hypot(*contact.point))
+    towards = -contact.point / distance if distance > 0 else contact.normal
+    return surface_of(scene.object, model or scene.planning.model, towards)
+
+
 def local_rho(thing: Object, direction: Array) -> float:
     """ρ = a/b of the local model about a straight push along a unit direction [m²]; of a support's pressure, nᵀΣn."""
     if thing.surface is None:

@@ -26,7 +26,7 @@ from ..problem.mechanics import (
     divergence_length,
     named,
     placement_of,
-    surface_of,
+    surface_at,
     takes_cone,
     virtual_contact,
 )
@@ -74,7 +74,7 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
             continue
         placement = placement_of(scene, named(scene, segment.push))
         contact = virtual_contact(scene, placement)
-        surface = surface_of(scene.object, scene.planning.model, -contact.point / np.hypot(*contact.point))
+        surface = surface_at(scene, contact)
         cone = takes_cone(scene, len(segment.fingers))
         if segment.push not in cars:
             cars[segment.push] = (

@@ -16,7 +16,7 @@ from ..contact.cone_twists import MISSED
 from ..geometry import compose, exp, pose_error, relative, rotate, shift_twist, transform
 from ..geometry.pose import Array
 from ..problem import PushSegment, Scene, Segment, SlideSegment, TableSegment, TransitSegment
-from ..problem.mechanics import contacts_of, named, placement_of, surface_of, takes_cone, virtual_contact
+from ..problem.mechanics import contacts_of, named, placement_of, surface_at, takes_cone, virtual_contact
 from .pieces import progress, turns_along
 from .plant import Plant
 from .slides import beside, plant_of_slides, rolled_out
@@ -204,8 +204,7 @@ def _kept(scene: Scene, segment: PushSegment, placement: Placement, label: str) 
 
     At both ends of every step, under the model that was planned with; how far its wrench misses the fingers' cone.
     """
-    toward = -virtual_contact(scene, placement).point
-    surface = surface_of(scene.object, scene.planning.model, toward / np.hypot(*toward))
+    surface = surface_at(scene, virtual_contact(scene, placement))
     cone, x = WrenchCone.of(contacts_of(scene, placement)), placement.pose
     steps = np.diff(segment.pusher, axis=0)
     least = np.ones(len(steps))

@@ -10,7 +10,7 @@ from ..geometry import rotate
 from ..geometry.pose import Array
 from ..planning import PushDescription
 from ..problem import Scene
-from ..problem.mechanics import contacts_of, slider_of, surface_of, virtual_contact
+from ..problem.mechanics import contacts_of, slider_of, surface_at, virtual_contact
 from ..steering.car import Car
 from .push_sketch import PushSketch
 
@@ -27,9 +27,7 @@ def _sketch(scene: Scene, described: PushDescription) -> PushSketch:
     placement = option.placement
     assert placement is not None
     contact = virtual_contact(scene, placement)
-    surface = surface_of(
-        scene.object, scene.planning.model, -contact.point / max(np.hypot(*contact.point), 1e-300)
-    )
+    surface = surface_at(scene, contact)
     motion, force = contact.motion_cone(surface), contact.force_edges()
     nothing = np.full(2, np.nan)
     car = option.car
