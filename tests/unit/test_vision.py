@@ -150,7 +150,7 @@ def test_a_block_that_moves_is_followed_in_windows_and_found_again(monkeypatch):
     poses = [compose(POSE, exp(k / 30 * np.array([0.03, 0.01, 0.4]))) for k in range(6)]
     moved = np.array([-0.1, 0.05, -2.0])
     seen, state = tracked(drawn, [*poses, *[moved] * 4])
-    assert whole[:6] == [True] + [False] * 5
+    assert whole[:11] == [True] + [False] * 10  # its window, and a part of the picture for a second one
     for one, pose in zip(seen[:6], poses, strict=True):
         assert np.hypot(*pose_error(one.sightings["object"].pose, pose)[:2]) < 3e-5
     # Elsewhere at once: not believed before it has been seen there thrice.
@@ -168,6 +168,24 @@ def test_two_objects_with_one_tag_are_named():
         tracker.step(tracker.start(), picture, 0.0)
     with pytest.raises(InputError, match="two objects have one tag"):
         Tracker(drawn.camera, drawn.tags)
+
+
+@pytest.mark.parametrize("where", [(-0.17, -0.12), (0.13, 0.1), (-0.03, -0.11)])
+def test_a_second_object_that_comes_with_the_tag_of_one_that_is_followed_is_named(where):
+    """Only the window around the first was looked at: when that was covered, the second took its name."""
+    tag = Tag(3, 0.03, 0.02)
+    both = watching(over(), {"object": tag, "other": tag})
+    alone, other = watching(over(), {"object": tag}), np.array([*where, 1.0])
+    tracker = Tracker(alone.camera, alone.tags)
+    state, first = tracker.start(), alone.picture({"object": POSE})
+    second = both.picture({"object": POSE, "other": other})
+    for k in range(50):
+        state, seen = tracker.step(state, first, k / 30)
+        assert not seen.notes
+    with pytest.raises(InputError, match=r"tag 3 is in picture (\d+) twice, at .* two objects wear it") as told:
+        for k in range(50, 100):
+            state, _ = tracker.step(state, second, k / 30)
+    assert 50 < int(str(told.value).split("picture ")[1].split()[0]) <= 98
 
 
 def test_pictures_out_of_order_of_another_size_or_with_a_wrong_tag_are_named():
