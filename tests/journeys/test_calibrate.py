@@ -223,6 +223,12 @@ def test_what_does_not_belong_together_is_refused(tmp_path):
     log.write_text(text.replace("block,c", "disc,c"))
     assert "no scene describes" in flatpush("replay", log, "--scene", scene).stderr
     log.write_text(text)
+    other.write_text(SCENE.replace("[-25, 17.5], ", ""))  # half of the block, of its name
+    ended = flatpush("replay", log, "--scene", other, "--json")
+    assert (ended.returncode, ended.stderr.count("warning: ")) == (0, 1)
+    assert "warning: runs of block end" in ended.stderr
+    assert len(json.loads(ended.stdout)) == 6
+    assert "warning" not in flatpush("replay", log, "--scene", scene).stderr
     assert "OBJECT=TAG" in flatpush("calibrate", log, "--scene", scene, "--tag", "block").stderr
     kept = CalibrationFile(np.zeros(6), np.zeros(2), {"cup": np.zeros(3)}, {}, 0.0, 0.5, 0.0, np.empty(0), 1)
     save_calibration(kept, tmp_path / "c.json")

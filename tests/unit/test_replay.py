@@ -12,7 +12,16 @@ from flatpush.experiments.replay import logged
 from flatpush.geometry import Outline, compose, exp, inverse
 from flatpush.problem import Object
 from flatpush.simulation.calibration import Parameters, Setup, contact_calibration, fit_to_ends
-from flatpush.simulation.replay import BELIEVED, Recording, errors, replay, rigid, trajectory_errors
+from flatpush.simulation.replay import (
+    BELIEVED,
+    Recording,
+    doubts,
+    errors,
+    gap_seen,
+    replay,
+    rigid,
+    trajectory_errors,
+)
 
 FINGERS, TIP = np.array([[0.0, 0.009], [0.0, -0.009]]), 0.0025
 TRUE = Parameters(
@@ -185,6 +194,31 @@ def test_what_cannot_be_a_run_of_this_object_is_named(given, recordings, how, sa
         Recording.of(spoilt(recordings[0].run, how)).check(thing, FINGERS, TIP)
     with pytest.raises(InputError, match="scene of another object"):
         recordings[0].check(Object(Outline.circle(0.06)), FINGERS, TIP)
+
+
+def test_runs_of_another_object_or_with_a_wrong_size_of_the_tag_are_told(given, recordings):
+    """They were replayed with differences of millimetres and status 0, without a word."""
+
+    corners = given.objects["rectangle"].outline.vertices
+
+    def gap(run, size=1.0, scale=1.0):
+        plant = TRUE.plant(replace(given, objects={"rectangle": Object(size * corners)}), "rectangle")
+        poses = run.run.poses * [scale, scale, 1.0]
+        run = Recording.of(replace(run.run, poses=poses))
+        return gap_seen(run, plant, FINGERS, TRUE.registration(given, "rectangle"), TRUE.lag)
+
+    for one in recordings:
+        assert gap(one) < 2e-4
+        assert gap(one, 1.1) == pytest.approx(0.1 * abs(corners).min(), abs=8e-4)
+        assert gap(one, 1.0, 1.1) > 2e-3
+    ends = np.array([[0.001, 0.02], [0.004, 0.06]])
+    assert not doubts("block", ends, np.full(2, 0.003), False)
+    assert not doubts("block", ends, np.full(2, 0.001), True)
+    (aside,) = doubts("block", ends, np.array([0.001, 0.003]), True)
+    assert "block was seen 2.0 mm from the finger that pushed it, in the mean of 2" in aside
+    (far,) = doubts("block", 10 * ends, np.full(2, 0.003), False)
+    assert "runs of block end 25 mm and 23° from where they are predicted" in far
+    assert "a wrong size or place of the tag" in far
 
 
 def test_a_camera_map_that_cannot_be_right_is_told():

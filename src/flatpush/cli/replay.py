@@ -48,7 +48,7 @@ def command(
     from ..documents import check_outputs, write_atomically
     from ..documents.calibration_file import load_calibration
     from ..simulation.calibration import Parameters
-    from ..simulation.replay import errors, trajectory_errors
+    from ..simulation.replay import doubts, errors, gap_seen, trajectory_errors
 
     check_outputs([*logs, *scene, *([] if calibration is None else [calibration])], [output, figure])
     if output is not None and output.suffix.lower() != ".csv":
@@ -72,7 +72,7 @@ def command(
         raise InputError(
             "the calibration holds no tag of this object", source=str(calibration), value=", ".join(unknown)
         )
-    final, way, outcomes = [], [], []
+    final, way, outcomes, gaps = [], [], [], []
     with telling("replaying"):
         for one in recordings:
             registration = p.registration(setup, one.run.object)
@@ -80,8 +80,16 @@ def command(
             final.append(errors(predicted.final, registration.poses(one.final)))
             way.append(trajectory_errors(one, predicted, registration, p.lag).mean(axis=0))
             outcomes.append(", ".join(word for word in predicted.outcomes if word))
+            plant = p.plant(setup, one.run.object)
+            gaps.append(gap_seen(one, plant, setup.fingers, registration, p.lag))
     ends, ways = np.array(final), np.array(way)
     runs = [one.run for one in recordings]
+    for name in setup.objects:
+        mine = np.array([run.object == name for run in runs])
+        for doubt in (
+            doubts(name, ends[mine], np.array(gaps)[mine], calibration is not None) if mine.any() else ()
+        ):
+            typer.echo(f"warning: {doubt}", err=True)
     if output is not None:
         lines = ["object,start,run,final_distance[m],final_angle[rad],way_distance[m],way_angle[rad],outcome"]
         for run, a, b, said in zip(runs, ends.tolist(), ways.tolist(), outcomes, strict=True):

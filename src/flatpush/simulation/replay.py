@@ -27,6 +27,10 @@ PUSHED, NEAR, NEAR_SIZE, LATE, STILL = 0.01, 0.005, 0.1, 0.3, 0.001
 PARTS = (0.25, 0.5, 0.75)
 # No camera misses so much of a push between two frames [m].
 LEAPS = 0.03
+# What belongs together ends nearer to where it is predicted, in the mean of an object's runs, also where nothing is
+# calibrated (3 mm and 6° at most of four recorded objects, the runs of the paper) [m, rad]; and calibrated, the outline
+# is seen nearer to the finger that pushes it (0.5 mm there) [m].
+FAR, FAR_TURN, ASIDE = 0.008, 0.2, 0.0015
 # A hand that has gone no further than this still rests, or rests again [m].
 RESTS = 0.0003
 # Two fingers hold the object between these ways of the hand from where it landed [m].
@@ -315,6 +319,50 @@ def trajectory_errors(
         then = np.column_stack([np.interp(at, run.times[a:b], column) for column in turned.T])
         found.append(errors(then, registration.poses(run.poses[a:b][seen])))
     return np.concatenate(found)
+
+
+def gap_seen(
+    recording: Recording, plant: Plant, fingers: Array, registration: Registration, lag: float
+) -> float:
+    """How far the camera saw the outline from the nearest finger while it was pushed [m]: the median over the second
+    half of a stroke, of the stroke with the most. No prediction is in it.
+
+    Args:
+        lag: the camera's poses come so much later than the robot's [s].
+    """
+    run, most, outline = recording.run, 0.0, plant.thing.outline
+    for (a, b), hand, way in zip(recording.strokes, recording.hands, recording.ways, strict=True):
+        times, seen = run.times[a:b], run.seen[a:b]
+        at = times[seen] - lag
+        late = np.interp(at, times, way) > 0.5 * way[-1]
+        if late.sum() < 2:
+            continue
+        poses = registration.poses(run.poses[a:b][seen][late])
+        there = np.column_stack([np.interp(at[late], times, column) for column in hand.T])
+        tips = transform(inverse(poses)[:, None], transform(there[:, None], fingers))
+        gaps = [min(abs(outline.nearest(p).distance - plant.tip_radius) for p in pair) for pair in tips]
+        if np.hypot(*(poses[-1] - poses[0])[:2]) > PUSHED:
+            most = max(most, float(np.median(gaps)))
+    return most
+
+
+def doubts(name: str, ends: Array, gaps: Array, calibrated: bool) -> tuple[str, ...]:
+    """What says that runs are not those of the scene's object, or that the camera sees wrongly.
+
+    Args:
+        name: of the object. ends: errors at the ends of its runs, (n, 2) [m, rad]. gaps: of gap_seen, (n,) [m].
+        calibrated: whether the camera's map is known, without which gaps tell nothing.
+    """
+    place, turn = ends.mean(axis=0)
+    found = []
+    if place > FAR or turn > FAR_TURN:
+        found.append(
+            f"runs of {name} end {1000 * place:.0f} mm and {np.rad2deg(turn):.0f}° from where they are predicted"
+        )
+    if calibrated and gaps.mean() > ASIDE:
+        found.append(f"{name} was seen {1000 * gaps.mean():.1f} mm from the finger that pushed it")
+    does = "the scene of another object, a wrong size or place of the tag, or another camera's calibration does that"
+    return tuple(f"{what}, in the mean of {len(ends)}: {does}" for what in found)
 
 
 def errors(predicted: Array, measured: Array) -> Array:
