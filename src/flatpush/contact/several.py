@@ -15,6 +15,7 @@ from .point_contact import ContactMode, PointContact
 
 CLOSED = 1e-9  # relative slack of what must not be negative
 _SCAN = 65
+_CLOSEST = 4 * np.finfo(float).eps  # relative: how near a root is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,38 +186,32 @@ def _rows_of(contact: PointContact, u: Array, sticking: bool) -> Array:
 def _sliding(
     contacts: Sequence[PointContact], surface: LimitSurface, u: Array, speed: float
 ) -> Iterator[Array]:
-    """Twists under two sliding contacts, by a scan over the mixtures of their forces and bisection."""
+    """Twists under two sliding contacts, by a scan over the mixtures of their forces and roots between."""
+    from scipy.optimize import brentq
+
     a, b = (float(c.normal @ v) for c, v in zip(contacts, u, strict=True))
     for left in ((x, y) for x in (True, False) for y in (True, False)):
         first, second = (_edge(c, side) for c, side in zip(contacts, left, strict=True))
         if not _may_slide(contacts, surface, u, left, np.array([a, b])):
             continue
 
-        def twist(share: float, first: Array = first, second: Array = second) -> tuple[Array, float, float]:
-            V = surface.twist((1 - share) * first + share * second)
-            p, q = (float(c.normal @ velocity_at(V, c.point)) for c in contacts)
+        def twist(share: ArrayLike, first: Array = first, second: Array = second) -> tuple[Array, Array, Array]:
+            part = np.asarray(share)[..., None]
+            V = surface.twist((1 - part) * first + part * second)
+            p, q = (velocity_at(V, c.point) @ c.normal for c in contacts)
             return V, p, q
 
-        def off(share: float) -> float:
+        def off(share: ArrayLike) -> Array:
             _, p, q = twist(share)
-            return (p * b - q * a) / np.hypot(p, q)
+            return np.asarray((p * b - q * a) / np.hypot(p, q))
 
         if np.linalg.norm(first + second) < 1e-9 * np.linalg.norm(first):
             continue
         # Dense near both ends, where one finger hardly presses.
         shares = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _SCAN))
-        values = [off(s) for s in shares]
-        for k in range(_SCAN - 1):
-            low, high, f = shares[k], shares[k + 1], values[k]
-            if f * values[k + 1] > 0:
-                continue
-            for _ in range(100):
-                middle = 0.5 * (low + high)
-                if middle in (low, high):
-                    break
-                m = off(middle)
-                low, high, f = (middle, high, m) if m * f > 0 else (low, middle, f)
-            V, p, q = twist(0.5 * (low + high))
+        values = off(shares)
+        for k in np.flatnonzero(values[:-1] * values[1:] <= 0):
+            V, p, q = twist(brentq(off, shares[k], shares[k + 1], xtol=1e-300, rtol=_CLOSEST, disp=False))
             square = p * p + q * q
             scale = (p * a + q * b) / square
             if scale <= 0 or np.hypot(scale * p - a, scale * q - b) > 1e-7 * speed:
