@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from flatpush.friction import Exact, Support
 from flatpush.geometry import pose_error
 from flatpush.planning import segments
 from flatpush.problem.mechanics import surface_of
+from flatpush.simulation.claims import LEAST_RESERVE, NO_RESERVE
 from flatpush.simulation.rollout import roll
 
 # Objects whose tightest turns with a fifth in reserve go about a foot, with the side to push at, by (edge, along).
@@ -66,6 +68,30 @@ def test_samples_too_far_apart_are_refused_though_their_straight_lines_are_near_
     ]
     distance, angle = off(plan)
     assert distance > 5e-5 or angle > math.radians(0.05)
+
+
+def bracket(margin):
+    scene = fp.load_scene(Path(__file__).parents[2] / "examples" / "bracket.yaml")
+    return fp.plan(replace(scene, planning=replace(scene.planning, friction_margin=margin)))
+
+
+@pytest.mark.parametrize(("margin", "warned"), [(0.0, True), (LEAST_RESERVE, False)])
+def test_a_plan_without_a_reserve_is_warned_of(margin, warned):
+    plan = bracket(margin)
+    certificate = plan.certificate
+    assert (NO_RESERVE in certificate.warnings) == warned
+    assert fp.verify(plan).ok
+    # A plan that an older version wrote says nothing of it.
+    older = replace(certificate, warnings=tuple(text for text in certificate.warnings if text != NO_RESERVE))
+    assert fp.verify(replace(plan, certificate=older)).ok
+    other = replace(certificate, warnings=(*certificate.warnings, "look out"))
+    assert [claim.name for claim in fp.verify(replace(plan, certificate=other)).failed] == ["warnings"]
+
+
+@pytest.mark.slow
+def test_the_least_reserve_that_is_not_warned_of_keeps_what_no_reserve_loses():
+    assert off(bracket(0.0))[0] > 0.01
+    assert off(bracket(LEAST_RESERVE))[0] < 1e-5
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.2])

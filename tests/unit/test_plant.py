@@ -216,10 +216,29 @@ def patient(monkeypatch, interpreted_steps):
     """As in a new process that interprets so many steps before it compiles."""
     monkeypatch.setattr(module, "PATIENCE", interpreted_steps)
     monkeypatch.setattr(module, "_interpreted", {})
+    monkeypatch.setattr(module, "_spent", {})
     monkeypatch.setattr(module, "_ready", set())
 
 
 COMPILED_ANYWAY = ["three feet", "ellipsoid"]
+
+
+def test_what_takes_too_long_to_interpret_is_broken_off_and_compiled(square, monkeypatch):
+    """A run in which fingers just slide takes minutes by the interpreter, and its length does not tell."""
+    patient(monkeypatch, 1e9)
+    monkeypatch.setattr(module, "ENOUGH", 0.01)
+    angle = np.linspace(0, 0.5, 200)
+    hand = np.stack([-1.2 + 2 * np.sin(angle), 2 * (1 - np.cos(angle)), angle], axis=1)
+    plant = Plant(square, [[0.0, 0.4], [0.0, -0.4]], 0.1, surface=surfaces()["three feet"])
+    starts = np.zeros((3, 3))
+    broken_off = plant.many(starts, hand, record=True)
+    assert module._ready
+    monkeypatch.setattr(module, "ENOUGH", 1e9)
+    monkeypatch.setattr(module, "_ready", set())
+    interpreted = plant.many(starts, hand, record=True)
+    assert not module._ready
+    assert np.array_equal(broken_off.object, interpreted.object)
+    assert np.array_equal(broken_off.modes, interpreted.modes)
 
 
 @pytest.mark.parametrize("threads", [1, None])

@@ -195,7 +195,9 @@ def _sliding(
         if not _may_slide(contacts, surface, u, left, np.array([a, b])):
             continue
 
-        def twist(share: ArrayLike, first: Array = first, second: Array = second) -> tuple[Array, Array, Array]:
+        def twist(
+            share: ArrayLike, first: Array = first, second: Array = second
+        ) -> tuple[Array, Array, Array]:
             part = np.asarray(share)[..., None]
             V = surface.twist((1 - part) * first + part * second)
             p, q = (velocity_at(V, c.point) @ c.normal for c in contacts)

@@ -43,6 +43,12 @@ from .tube import tube_of
 TRUSTED_GROWTH = float(np.exp(4.0))
 
 
+# A plan for two fingers with less of the friction in reserve is told so: between its samples it may need what it lacks.
+LEAST_RESERVE = 0.02
+NO_RESERVE = (
+    "two fingers: next to no friction is kept in reserve, and straight between samples a robot may lose the object."
+    " Plan with margin: {friction: 0.02} at least"
+)
 # What every plan with slides is told with.
 LESS_CERTAIN = (
     "pushes that slide are less certain than pushes that stick: look after each, as flatpush track does"
@@ -138,7 +144,7 @@ def certify(scene: Scene, segments: Sequence[Segment]) -> Certificate:
         clearance=clearance,
         cars=cars,
         warnings=(
-            *_warnings(growth, worst),
+            *_warnings(scene, growth, worst),
             *((LESS_CERTAIN,) if slides else ()),
             *((no_tube,) if no_tube else ()),
         ),
@@ -217,7 +223,7 @@ def _transit_length(segment: TransitSegment) -> float:
     return float(np.sum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
 
 
-def _warnings(growth: float | None, worst: Margins) -> list[str]:
+def _warnings(scene: Scene, growth: float | None, worst: Margins) -> list[str]:
     found = []
     if growth is not None and growth > TRUSTED_GROWTH:
         found.append(
@@ -228,6 +234,9 @@ def _warnings(growth: float | None, worst: Margins) -> list[str]:
         found.append(
             f"one finger: a small error grows {growth:.0f}-fold on the way; land precisely or use feedback"
         )
+    kept = worst.composite
+    if scene.planning.friction_margin < LEAST_RESERVE and kept is not None and kept < LEAST_RESERVE:
+        found.append(NO_RESERVE)
     if worst.composite is not None and worst.composite < 0:
         found.append(
             "two fingers: under the believed limit surface a motion needs more friction than the two contacts have;"

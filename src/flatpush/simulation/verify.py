@@ -12,7 +12,7 @@ from ..errors import FlatpushError, InputError
 from ..problem import Certificate, Plan, Scene
 from ..problem.certificate import SetWorst
 from ..problem.mechanics import proved_for_set, starts_anywhere
-from .claims import arc_costs, certify
+from .claims import NO_RESERVE, arc_costs, certify
 from .execution import Finding, execution_findings
 from .proof import worst_depth
 from .slides import slide_sensitivity
@@ -170,6 +170,8 @@ def _certified(plan: Plan, computed: Certificate) -> list[Claim]:
     unknown = [Claim(key, str(value), None, 0.0, False, "known") for key, value in told.pop("others").items()]
     told = {key: value for key, value in told.items() if value is not None or key not in LATER}
     told.pop("set_worst", None)
+    if NO_RESERVE not in told["warnings"]:  # an older plan
+        found["warnings"] = tuple(w for w in found["warnings"] if w != NO_RESERVE)
     claims = [_stated(key, value, found[key]) for key, value in told.items()]
     if stated.set_worst is not None:
         claims.append(_set_worst(plan, stated.set_worst, computed))

@@ -1,10 +1,11 @@
 """Who makes a plant's runs: the compiled steps, the same steps interpreted while there are few, or the plain plant."""
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from .arrays import (
     SCRATCH,
     SEEN,
     OutlineArrays,
+    Row,
     Rows,
     RunArrays,
     Setting,
@@ -43,16 +45,34 @@ Codes = NDArray[np.integer]
 
 # Steps that this process interprets for a kind of surface before it compiles the kernels for it (a step takes about a
 # millisecond then, compiling takes longer than all of them), how many it has, and the kinds for which it has compiled.
-PATIENCE = 3000.0
+# Where two fingers just slide a step takes a hundred times as long: what was interpreted for longer than ENOUGH [s] in
+# all is broken off. How long that was.
+PATIENCE, ENOUGH = 3000.0, 6.0
 # Steps of the compiled kernels that are not worth a second thread (a step takes about ten microseconds).
 ALONE = 2000.0
 _interpreted: dict[type, float] = {}
+_spent: dict[type, float] = {}
 _ready: set[type] = set()
 
 
 # Numbers in rows, and where the hands begin in the scratch.
 _SEEN, _SCRATCH = SEEN.itemsize // 8, SCRATCH.itemsize // 8
 _HANDS = sum(SCRATCH[name].itemsize for name in ("contacts", "rays", "planes", "q")) // 8
+
+
+class _Tired(Exception):
+    """Interpreting has taken too long."""
+
+
+class _Watched(list[Row]):
+    """Rows that the interpreter writes to, up to a time of its thread [s]."""
+
+    until = np.inf
+
+    def __getitem__(self, index: Any) -> Any:
+        if time.thread_time() > self.until:
+            raise _Tired
+        return super().__getitem__(index)
 
 
 class Task(NamedTuple):
@@ -186,10 +206,9 @@ class Runner:
             kind = type(surfaces[0])
             if kind not in _ready:
                 _interpreted[kind] = _interpreted.get(kind, 0.0) + n * self._work(task.hands)
-            if kind in _ready or _interpreted[kind] > PATIENCE:
+            late = kind in _ready or _interpreted[kind] > PATIENCE
+            if late or not self._interpreted(task, surfaces, done):
                 self._compiled(task, surfaces, threads, done)
-            else:
-                self._interpreted(task, surfaces, done)
         for r in np.flatnonzero(ends[:, 0] >= MANY).tolist():
             self._plainly(task, r, done)
         return done
@@ -243,12 +262,15 @@ class Runner:
             self._last = key, run_arrays(surfaces, cofs, mus)
         return self._last[1]
 
-    def _interpreted(self, task: Task, surfaces: Sequence[SurfaceArrays], done: Done) -> None:
+    def _interpreted(self, task: Task, surfaces: Sequence[SurfaceArrays], done: Done) -> bool:
+        """Whether the runs were made; not where that would take too long."""
+        kind, began = type(surfaces[0]), time.thread_time()
         room, count = scratch(), task.hands.shape[2]
         ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in task.hands]
         outline, fingers, own = self._rows
         plain = [own if own and arrays is self._surface else interpreted(arrays) for arrays in surfaces]
-        out, seen = blank(POSE, task.rows), blank(SEEN, task.rows * len(fingers))
+        out, seen = _Watched(blank(POSE, task.rows)), blank(SEEN, task.rows * len(fingers))
+        out.until = began + ENOUGH - _spent.get(kind, 0.0)
         start = blank(POSE, 1)[0]
         for r, pose in enumerate(task.starts.tolist()):
             made, way = self._of_run(task, r), ways[r % len(ways)]
@@ -261,6 +283,8 @@ class Runner:
                 done.ends[r] = steps.follow(
                     setting, start, way, count, task.begin, task.kind, out, seen, room
                 )
+            except _Tired:
+                break
             except (ArithmeticError, ValueError):  # where the compiled formulas go on with inf or nan
                 done.ends[r] = UNDECIDED, 0
                 continue
@@ -268,6 +292,8 @@ class Runner:
             done.seen[r, ..., :3] = np.reshape([(s.x, s.y, s.gap) for s in seen], (task.rows, -1, 3))
             done.modes[r] = np.reshape([(s.mode, s.modes) for s in seen], (task.rows, -1, 2))
             done.hands[:] = [(h.x, h.y, h.angle) for h in room.hands[:count]]
+        _spent[kind] = _spent.get(kind, 0.0) + time.thread_time() - began
+        return _spent[kind] <= ENOUGH
 
     def _plainly(self, task: Task, r: int, done: Done) -> None:
         fingers, q, way = self._of_run(task, r), task.starts[r].copy(), task.hands[r % len(task.hands)]
