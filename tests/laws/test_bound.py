@@ -8,9 +8,11 @@ import pytest
 
 import flatpush as fp
 from flatpush.errors import InputError
+from flatpush.geometry import rotate
 from flatpush.planning.bound import bounded, bounds, check_bound
 from flatpush.planning.bound.bound import _chains
-from flatpush.planning.bound.boxes import SIDES, box_bound
+from flatpush.planning.bound.boxes import box_bound
+from flatpush.planning.bound.chains import SIDES
 from flatpush.planning.query import Query
 from flatpush.planning.refine import refine
 from flatpush.steering.fleet import Fleet
@@ -71,6 +73,84 @@ def test_no_sample_of_a_box_is_below_its_bound(kind, size):
             assert least <= best * (1 + 1e-12)
             shares.append(least / best)
     assert np.median(shares) > {1.0: 0.0, 0.2: 0.1, 0.01: 0.9, 1e-4: 0.999}[size]
+
+
+def driven(rng, fleet, start, legs):
+    """Pushes and the ends of their legs, driven from a pose: words of any pieces, many of them of no length."""
+    pushes = [int(rng.integers(fleet.size))]
+    while len(pushes) < legs:
+        pushes.append(int(rng.choice([p for p in range(fleet.size) if p != pushes[-1]])))
+    pose, poses = start, []
+    for push in pushes:
+        first, last = rng.choice([-1.0, 1.0], 2)
+        middle = rng.choice([0.0, -first])
+        last = last if middle == 0 else first
+        for side in (first, middle, last):
+            amount = rng.choice([0.0, 1e-3, 1.0], p=[0.35, 0.1, 0.55]) * rng.uniform(0, 1.5)
+            amount += np.pi * (amount > 0 and middle != 0 and side == middle and rng.random() < 0.7)
+            pose = moved(fleet, push, side, amount, pose)
+        poses.append(pose)
+    return pushes, np.array(poses)
+
+
+def moved(fleet, push, side, amount, pose):
+    """Along one piece: an angle to the left (1) or right (-1), or a tenth as many metres straight on (0)."""
+    if side == 0:
+        return pose + np.append(0.1 * amount * rotate(pose[2], fleet.direction[push]), 0.0)
+    centre = (fleet.left if side > 0 else fleet.right)[push]
+    angle = pose[2] + side * amount
+    return np.array([*(pose[:2] + rotate(pose[2], centre) - rotate(angle, centre)), angle])
+
+
+def box_about(chains, pushes, poses):
+    """The chain of these pushes, and where its legs end, shape (SIDES,)."""
+    chain = next(i for i, n in enumerate(chains.legs) if list(chains.pushes[i, :n]) == pushes)
+    ends = np.zeros(SIDES)
+    for leg, pose in enumerate(poses):
+        ends[3 * leg : 3 * leg + 3] = [*(pose[:2] + rotate(pose[2], chains.at[chain, leg])), pose[2]]
+    return chain, ends
+
+
+@pytest.mark.parametrize("kind", ["dubins", "cone"])
+def test_no_plan_that_is_driven_is_below_the_bound_of_a_box_that_holds_it(kind):
+    """Plans with pieces of no length lie where words meet; boxes of all sizes about them, flat ones and odd ones."""
+    rng = np.random.default_rng(21)
+    for trial in range(600):
+        fleet = random_fleet(rng, kind)
+        start = rng.uniform(-1, 1, 3) * [0.1, 0.1, np.pi]
+        legs, wide = 1 + trial % 3, rng.random() < 0.3
+        pushes, poses = driven(rng, fleet, start, legs)
+        chains = _chains(
+            Query(fleet, start, poses[-1], slack=wide * np.array([0.01, 0.005, 0.1])), 2.0, (legs,)
+        )
+        chain, ends = box_about(chains, pushes, poses)
+        half = np.tile([0.1, 0.1, 1.0], 3) * 10 ** rng.uniform(-6, -0.5) * rng.choice([0.01, 0.1, 1.0], SIDES)
+        half[3 * legs - 3 : 3 * legs] *= wide
+        half[3 * legs :] = 0.0
+        middle = ends + half * rng.uniform(-1, 1, SIDES) * rng.integers(2)
+        least = box_bound(fleet.cars, chains, chain, middle, half, np.inf)
+        inside = rng.uniform(-1, 1, (12, SIDES))
+        inside[:6] = np.sign(inside[:6])
+        words, order = np.zeros(legs, WORD), chains.pushes[chain, :legs].copy()
+        for at in (ends, *(middle + inside * half)):
+            cost = chain_cost(fleet.cars, order, poses_of(chains, chain, at), words)
+            assert least <= (cost + chains.switching[chain]) * (1 + 1e-12) + 1e-15, (trial, pushes)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_legs_that_meet_are_bounded_together_about_the_cheapest_plan(seed):
+    """Each alone errs by the size of the box, by 2 % and 0.2 % here; both together by its square."""
+    fleet = random_fleet(np.random.default_rng(seed), "dubins")
+    start = np.random.default_rng(seed).uniform(-1, 1, 3) * [0.15, 0.15, np.pi]
+    query = Query(fleet, start, np.zeros(3))
+    best = refine(query, rounds=20, legs=2)
+    assert len(best.pushes) == 2
+    chains = _chains(query, 1.0, (2,))
+    chain, ends = box_about(chains, list(best.pushes), best.poses[1:])
+    for size, most in ((1e-2, 1e-3), (1e-3, 1e-5)):
+        half = np.array([0.1 * size, 0.1 * size, size, *np.zeros(SIDES - 3)])
+        least = box_bound(fleet.cars, chains, chain, ends, half, np.inf)
+        assert (1 - most) * best.cost < least <= best.cost
 
 
 def test_jumps_of_the_length_are_inside_the_bounds():

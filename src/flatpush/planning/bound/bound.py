@@ -16,7 +16,7 @@ from ..query import Query
 
 if TYPE_CHECKING:
     from ..refine.problem import Candidate, Sequences
-    from .boxes import Chains
+    from .chains import Chains
 
 CHANGES = 2  # of contact, of the plans that are searched
 OPEN = 1_000_000  # boxes that are kept at most, 130 MB in all
@@ -33,7 +33,7 @@ class Bound:
         least_of_all: the same of any number of changes between these pushes.
         found: a plan cheaper than the one that was given, or None.
         boxes: how many have been halved; open: how many are left.
-        complete: whether the known plan is the cheapest of at most two changes.
+        complete: whether the known plan is the cheapest of at most two changes, to a millionth.
         full: whether the search ends because there is no room for more boxes.
     """
 
@@ -109,7 +109,7 @@ class _Search:
     """A search over the plans of some numbers of legs.
 
     Attributes:
-        complete: whether no box is left that could hold a cheaper plan, or only what is no box any more.
+        complete: whether no box is left that could hold a plan cheaper by a millionth, or only what is no box any more.
         full: whether there is no room for more.
     """
 
@@ -131,8 +131,10 @@ class _Search:
 
     @best.setter
     def best(self, cost: float) -> None:
+        from .boxes import CLOSE
+
         self._state["best"] = cost
-        self.complete |= self.least >= cost
+        self.complete |= self.least >= cost * (1 - CLOSE)
 
     @property
     def least(self) -> float:
@@ -148,11 +150,11 @@ class _Search:
         return int(self._state["halved"][0])
 
     def go_on(self) -> None:
-        from .boxes import halve
+        from .boxes import CLOSE, halve
 
         if not halve(self._cars, self._chains, self._boxes, self._state, HALVED):
             room = len(self._boxes.bound) - int(self._state["used"][0] - self._state["freed"][0])
-            self.full = room < 2 and self.least < self.best
+            self.full = room < 2 and self.least < self.best * (1 - CLOSE)
             self.complete = not self.full
 
     def taken(self, sequences: "Sequences") -> "Candidate | None":
@@ -180,7 +182,7 @@ def _polished(sequences: "Sequences", chains: "Chains", chain: int, ends: Array)
 
 def _chains(query: Query, cost: float, numbers: tuple[int, ...]) -> "Chains":
     """Sequences of so many pushes, and a box that holds the ends of their legs in plans up to a cost."""
-    from .boxes import MOST_LEGS, Chains
+    from .chains import MOST_LEGS, Chains
 
     fleet, rows, way = query.fleet, [], _least_way(query)
     for number in numbers:
@@ -211,7 +213,7 @@ def _chains(query: Query, cost: float, numbers: tuple[int, ...]) -> "Chains":
                 query, point, (cost - switching) * speeds[pair], goal_half
             )
     flat = (n, 3 * MOST_LEGS)
-    changing = np.array([value for _, value in rows])
+    changing = np.array([value for _, value in rows], dtype=float)
     return Chains(
         legs,
         order,

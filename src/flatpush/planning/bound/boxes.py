@@ -14,12 +14,12 @@ from ...compiled import inner, kernel
 from ...formulas import Record
 from ...geometry.pose import Array
 from ...steering.six_words import WORD, Records, cheapest_word
-from .legs import End, end_of, leg_bound
+from .chains import MOST_LEGS, SIDES, Chains
+from .joint import Scratch, chain_bound, scratch
 
-MOST_LEGS = 3
-SIDES = 3 * MOST_LEGS  # x, y, θ of the end of every leg
 POINT = 52  # a side that was halved so often is shorter than the rounding of its middle
 LOOKED_AT = 4  # the middle of every so many boxes is tried as a plan
+CLOSE = 1e-6  # a plan that is dearer than the bound by no more than this part is the cheapest
 
 # The search as it stands: boxes that are open, slots that were ever used, slots that are free again, boxes halved so
 # far, the cheapest known cost, and, if the search found it, its chain (else -1) and the ends of its legs.
@@ -29,29 +29,6 @@ STATE = np.dtype(
         ("best", float), ("chain", np.int64), ("ends", float, SIDES),
     ]
 )  # fmt: skip
-
-
-class Chains(NamedTuple):
-    """Sequences of pushes, n of them.
-
-    Attributes:
-        legs: how many each has, shape (n,); pushes: their cars, shape (n, MOST_LEGS).
-        switching: cost of the changes, shape (n,); least: what a plan costs at least, shape (n,).
-        start: pose, shape (3,).
-        middle, half: of the first box, shape (n, SIDES) [m, m, rad, ...].
-        lever: cost of a side's unit, by which the longest side is found, shape (n, SIDES).
-        at: reference points of the legs' ends, in the object frame, shape (n, MOST_LEGS, 2) [m].
-    """
-
-    legs: NDArray[np.int64]
-    pushes: NDArray[np.int64]
-    switching: Array
-    least: Array
-    start: Array
-    middle: Array
-    half: Array
-    lever: Array
-    at: Array
 
 
 class Boxes(NamedTuple):
@@ -84,6 +61,7 @@ def begin(cars: Records, chains: Chains, boxes: Boxes, state: Records) -> None:
     now = state[0]
     words = np.zeros(MOST_LEGS, WORD)
     here, there = np.zeros(3), np.zeros(3)
+    work = scratch()
     for chain in range(len(chains.legs)):
         slot = _slot(boxes, now)
         boxes.chain[slot] = chain
@@ -91,20 +69,21 @@ def begin(cars: Records, chains: Chains, boxes: Boxes, state: Records) -> None:
         boxes.middle[slot, :] = chains.middle[chain]
         boxes.bound[slot] = chains.least[chain]
         _look(cars, chains, boxes, now, slot, words, here, there)
-        _open(cars, chains, boxes, now, slot)
+        _open(cars, chains, boxes, now, slot, work)
 
 
 @kernel()
 def halve(cars: Records, chains: Chains, boxes: Boxes, state: Records, count: int) -> bool:
-    """Halves so many boxes; returns whether it could go on: boxes are left, none is a point, and there is room."""
+    """Halves so many boxes; returns whether it could: the bound is not close, no box is a point, and there is room."""
     now = state[0]
     words = np.zeros(MOST_LEGS, WORD)
     here, there = np.zeros(3), np.zeros(3)
+    work = scratch()
     for _ in range(count):
         if now.size == 0 or now.used - now.freed + 2 > len(boxes.bound):
             return False
         slot = boxes.heap[0]
-        if boxes.bound[slot] >= now.best:
+        if boxes.bound[slot] >= now.best * (1.0 - CLOSE):
             return False
         side = _longest(chains, boxes, slot)
         if side < 0:
@@ -123,33 +102,15 @@ def halve(cars: Records, chains: Chains, boxes: Boxes, state: Records, count: in
         boxes.middle[twin, :] = boxes.middle[slot]
         boxes.middle[slot, side] -= half
         boxes.middle[twin, side] += half
-        _open(cars, chains, boxes, now, slot)
-        _open(cars, chains, boxes, now, twin)
+        _open(cars, chains, boxes, now, slot, work)
+        _open(cars, chains, boxes, now, twin, work)
     return True
 
 
 @kernel()
 def box_bound(cars: Records, chains: Chains, chain: int, middle: Array, half: Array, limit: float) -> float:
     """The bound of one box (SIDES,) of a chain; the limit where it is above that."""
-    total = chains.switching[chain]
-    x, y, theta = chains.start[0], chains.start[1], chains.start[2]
-    a = end_of(x, y, theta, (0.0, 0.0, 0.0), (0.0, 0.0))
-    for leg in range(chains.legs[chain]):
-        b = _end(chains, chain, leg, middle, half)
-        total += leg_bound(cars[chains.pushes[chain, leg]], a, b, limit - total)
-        if total >= limit:
-            return limit
-        a = b
-    return total
-
-
-@inner
-def _end(chains: Chains, chain: int, leg: int, middle: Array, half: Array) -> End:
-    i = 3 * leg
-    at = chains.at[chain, leg]
-    return end_of(
-        middle[i], middle[i + 1], middle[i + 2], (half[i], half[i + 1], half[i + 2]), (at[0], at[1])
-    )
+    return chain_bound(cars, chains, chain, middle, half, -np.inf, limit, scratch())
 
 
 @inner
@@ -210,15 +171,17 @@ def _slot(boxes: Boxes, now: Record) -> int:
 
 
 @inner
-def _open(cars: Records, chains: Chains, boxes: Boxes, now: Record, slot: int) -> None:
+def _open(cars: Records, chains: Chains, boxes: Boxes, now: Record, slot: int, work: Scratch) -> None:
     """Puts a box on the heap, or frees its slot where nothing in it can be cheaper than what is known.
 
     What bounded the box that it is a half of bounds it too, and stands as its bound.
     """
     half = np.empty(SIDES)
     _halves(chains, boxes, slot, half)
+    known = boxes.bound[slot]
     bound = max(
-        boxes.bound[slot], box_bound(cars, chains, boxes.chain[slot], boxes.middle[slot], half, now.best)
+        known,
+        chain_bound(cars, chains, boxes.chain[slot], boxes.middle[slot], half, known, now.best, work),
     )
     if bound >= now.best:
         boxes.free[now.freed] = slot

@@ -13,19 +13,41 @@ modulo a turn; two arcs to different sides differ by it. So the least pair above
 
 Every bound is below what the word costs between any two poses of the boxes, so the least of the six is below every
 leg. Costs are lengths: the time of a piece is not linear in it, and is not treated.
+
+What is found about a word on the way, between which headings its arcs end and how long its straight piece is, is kept:
+joint.py makes a better bound of it where legs meet.
 """
 
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from ...compiled import inner
 from ...formulas import Record
+from ...steering.six_words import Records
 
 TURN = 2 * math.pi
 # Slack for rounding, and for the arcs just short of a full turn that six_words.py takes as zero: of lengths by the
 # query's, of angles [rad].
 ROUNDING, ANGLE = 1e-9, 1e-9
 LEFT, STRAIGHT, RIGHT = 0, 1, 2  # places of the rates
+WIDE = (
+    0.5 * math.pi
+)  # arcs known no better than this, half an interval [rad], are not kept: nothing comes of them
+MOST_KEPT = 12  # words of a leg: LSL, RSR, and two kinds of each other
+
+# A word between two boxes, with its arcs in the lowest turns that these allow: what it costs at least; letters of its
+# pieces; heading where the first arc ends and where the last begins (one for a straight piece), unwound from that of
+# the first box, and half their intervals, infinite where nothing is known about them; by how much the last heading of
+# the second box is more, unwound; least and greatest length or angle of the middle piece; whether the first and the
+# last arc may be zero; and what it costs more when it ends a metre further, at its middle.
+KEPT = np.dtype(
+    [
+        ("least", float), ("letter", np.int64, 3), ("heading", float, 2), ("spread", float), ("wound", float),
+        ("short", float), ("long", float), ("opens", np.bool_), ("closes", np.bool_), ("costate", float, 2),
+    ]
+)  # fmt: skip
 
 
 class End(NamedTuple):
@@ -79,22 +101,65 @@ def end_of(
     )  # fmt: skip
 
 
+class Known(NamedTuple):
+    """What is known about a leg: words that were kept, the least bound of those that were not, and of all."""
+
+    kept: int
+    other: float
+    least: float
+
+
+class Arc(NamedTuple):
+    """Angle of an arc within the lowest turn that the boxes allow [rad]: middle and half of its interval."""
+
+    middle: float
+    half: float
+    least: float
+    may_vanish: bool
+
+
 @inner
-def leg_bound(car: Record, a: End, b: End, limit: float) -> float:
-    """What a leg of a car from a box to a box costs at least; any value above the limit where that is above it."""
+def leg_bound(car: Record, a: End, b: End, limit: float, kept: Records) -> Known:
+    """What a leg of a car from a box to a box costs at least, if less than the limit; its words are filled in."""
     scale = math.hypot(b.x - a.x, b.y - a.y) + 2.0 * car.radius
     left_a, right_a = _disc(a, car.left_x, car.left_y), _disc(a, car.right_x, car.right_y)
     left_b, right_b = _disc(b, car.left_x, car.left_y), _disc(b, car.right_x, car.right_y)
     left, right = _between(left_a, left_b, scale), _between(right_a, right_b, scale)
-    ahead = math.atan2(car.ahead_y, car.ahead_x)
-    wl, ws, wr = car.rate[LEFT], car.rate[STRAIGHT], car.rate[RIGHT]
-    best = limit
-    best = min(best, _same(left, a, b, ahead, 1.0, wl, ws, best))
-    best = min(best, _same(right, a, b, ahead, -1.0, wr, ws, best))
-    best = min(best, _other(car, _between(left_a, right_b, scale), a, b, 1.0, best))
-    best = min(best, _other(car, _between(right_a, left_b, scale), a, b, -1.0, best))
-    best = min(best, _three(car, left, a, b, 1.0, best))
-    return min(best, _three(car, right, a, b, -1.0, best))
+    known = Known(0, limit, limit)
+    known = _same(car, left, a, b, 1.0, limit, kept, known)
+    known = _same(car, right, a, b, -1.0, limit, kept, known)
+    known = _other(car, _between(left_a, right_b, scale), a, b, 1.0, limit, kept, known)
+    known = _other(car, _between(right_a, left_b, scale), a, b, -1.0, limit, kept, known)
+    known = _three(car, left, a, b, 1.0, limit, kept, known)
+    return _three(car, right, a, b, -1.0, limit, kept, known)
+
+
+@inner
+def _with(known: Known, least: float) -> Known:
+    """With a word that is not kept."""
+    return Known(known.kept, min(known.other, least), min(known.least, least))
+
+
+@inner
+def _keep(known: Known, word: Record, least: float) -> Known:
+    word.least = least
+    return Known(known.kept + 1, known.other, min(known.least, least))
+
+
+@inner
+def _arc(angle: float, half: float) -> Arc:
+    """The arcs within half of an angle, modulo a turn: those of the lowest turn, from zero on."""
+    middle = angle % TURN
+    if middle + half >= TURN:
+        middle -= TURN
+    return Arc(middle, half, max(0.0, middle - half), middle < half)
+
+
+@inner
+def _letters(word: Record, sense: float, straight: bool, ends_left: bool) -> None:
+    word.letter[0] = LEFT if sense > 0 else RIGHT
+    word.letter[1] = STRAIGHT if straight else (RIGHT if sense > 0 else LEFT)
+    word.letter[2] = LEFT if ends_left else RIGHT
 
 
 @inner
@@ -118,13 +183,6 @@ def _between(a: Disc, b: Disc, scale: float) -> Between:
 
 
 @inner
-def _least_turn(angle: float, half: float) -> float:
-    """The least in [0, 2π) of the angles within half of one, modulo a turn."""
-    middle = angle % TURN
-    return middle - half if half < middle and middle + half < TURN else 0.0
-
-
-@inner
 def _least_above(low: float, angle: float, half: float) -> float:
     """The least value from low on that is within half of an angle, modulo a turn."""
     turns = math.ceil((low - angle - half) / TURN)
@@ -133,42 +191,61 @@ def _least_above(low: float, angle: float, half: float) -> float:
 
 @inner
 def _same(
-    w: Between, a: End, b: End, ahead: float, sense: float, rate: float, straight: float, limit: float
-) -> float:
+    car: Record, w: Between, a: End, b: End, sense: float, limit: float, kept: Records, known: Known
+) -> Known:
     """LSL (sense 1) or RSR (-1)."""
+    rate, straight = car.rate[LEFT if sense > 0 else RIGHT], car.rate[STRAIGHT]
     cost = straight * w.near
     if cost >= limit:
-        return cost
-    heading = w.way - ahead  # of the object on the straight piece
-    first = _least_turn(sense * (heading - a.theta), w.spread + a.turn)
-    last = _least_turn(sense * (b.theta - heading), w.spread + b.turn)
-    return cost + rate * _least_above(first + last, sense * (b.theta - a.theta), a.turn + b.turn)
+        return known
+    heading = w.way - math.atan2(car.ahead_y, car.ahead_x)  # of the object on the straight piece
+    first = _arc(sense * (heading - a.theta), w.spread + a.turn).least
+    last = _arc(sense * (b.theta - heading), w.spread + b.turn).least
+    angle, half = sense * (b.theta - a.theta), a.turn + b.turn
+    turns = math.ceil((first + last - angle - half) / TURN)
+    least = cost + rate * max(first + last, angle - half + TURN * turns)
+    if least >= limit:
+        return known
+    if half >= WIDE:
+        return _with(known, least)
+    known = _with(known, cost + rate * (angle - half + TURN * (turns + 1)))
+    word = kept[known.kept]
+    _letters(word, sense, True, sense > 0)
+    word.heading[0] = word.heading[1] = heading
+    word.spread, word.wound = w.spread, sense * TURN * turns
+    word.short, word.long = w.near, w.far
+    word.opens = word.closes = False  # the sum of the arcs alone counts
+    word.costate[0], word.costate[1] = straight * math.cos(w.way), straight * math.sin(w.way)
+    return _keep(known, word, least)
 
 
 @inner
-def _other(car: Record, w: Between, a: End, b: End, sense: float, limit: float) -> float:
+def _other(
+    car: Record, w: Between, a: End, b: End, sense: float, limit: float, kept: Records, known: Known
+) -> Known:
     """LSR (sense 1) or RSL (-1); where the straight direction leans back, both lengths."""
     dx, dy = sense * (car.right_x - car.left_x), sense * (car.right_y - car.left_y)
     along, across = dx * car.ahead_x + dy * car.ahead_y, dx * car.ahead_y - dy * car.ahead_x
     if w.far < abs(across):
-        return math.inf
+        return known
     least, most = math.sqrt(max(0.0, w.near**2 - across**2)), math.sqrt(w.far**2 - across**2)
-    best = limit
     if most >= along:
-        best = min(best, _bent(car, w, a, b, sense, max(0.0, least - along), most - along, best))
+        known = _bent(car, w, a, b, sense, max(0.0, least - along), most - along, limit, kept, known)
     if least <= -along:
-        best = min(best, _bent(car, w, a, b, sense, max(0.0, -most - along), -least - along, best))
-    return best
+        known = _bent(car, w, a, b, sense, max(0.0, -most - along), -least - along, limit, kept, known)
+    return known
 
 
 @inner
 def _bent(
-    car: Record, w: Between, a: End, b: End, sense: float, short: float, long: float, limit: float
-) -> float:
+    car: Record, w: Between, a: End, b: End, sense: float, short: float, long: float, limit: float,
+    kept: Records, known: Known,
+) -> Known:  # fmt: skip
     """LSR or RSL with a straight piece between two lengths."""
-    cost = car.rate[STRAIGHT] * short
+    straight = car.rate[STRAIGHT]
+    cost = straight * short
     if cost >= limit:
-        return cost
+        return known
     dx, dy = sense * (car.right_x - car.left_x), sense * (car.right_y - car.left_y)
     # In the object frame the centres lie apart by this arm, whose direction turns one way while the piece grows.
     px, py = dx + short * car.ahead_x, dy + short * car.ahead_y
@@ -176,41 +253,100 @@ def _bent(
     half = 0.5 * math.atan2(px * qy - py * qx, px * qx + py * qy)
     heading = w.way - (math.atan2(py, px) + half)
     spread = w.spread + abs(half)
-    first = _least_turn(sense * (heading - a.theta), spread + a.turn)
-    last = _least_turn(sense * (heading - b.theta), spread + b.turn)
+    first = _arc(sense * (heading - a.theta), spread + a.turn)
+    last = _arc(sense * (heading - b.theta), spread + b.turn)
     rate_a, rate_b = (car.rate[LEFT], car.rate[RIGHT]) if sense > 0 else (car.rate[RIGHT], car.rate[LEFT])
     angle, turn = sense * (b.theta - a.theta), a.turn + b.turn
-    more_first = _least_above(first - last, angle, turn) - (first - last)
-    more_last = _least_above(last - first, -angle, turn) - (last - first)
-    return cost + rate_a * first + rate_b * last + min(rate_a * more_first, rate_b * more_last)
+    more_first = _least_above(first.least - last.least, angle, turn) - (first.least - last.least)
+    more_last = _least_above(last.least - first.least, -angle, turn) - (last.least - first.least)
+    arcs = rate_a * first.least + rate_b * last.least
+    least = cost + arcs + min(rate_a * more_first, rate_b * more_last)
+    if least >= limit:
+        return known
+    if first.half >= WIDE or last.half >= WIDE:
+        return _with(known, least)
+    if first.may_vanish:
+        known = _with(known, cost + arcs + rate_a * (first.middle - first.half + TURN))
+    if last.may_vanish:
+        known = _with(known, cost + arcs + rate_b * (last.middle - last.half + TURN))
+    word = kept[known.kept]
+    _letters(word, sense, True, sense < 0)
+    _wind(word, a, b, sense * first.middle, 0.0, -sense * last.middle)
+    word.spread, word.short, word.long = spread, short, long
+    word.opens, word.closes = first.may_vanish, last.may_vanish
+    along, across = dx * car.ahead_x + dy * car.ahead_y, dx * car.ahead_y - dy * car.ahead_x
+    lean = sense * (rate_a + rate_b) - straight * across  # 0 of Dubins cars
+    lean /= max(0.5 * (short + long) + along, car.radius)
+    c, s = math.cos(heading), math.sin(heading)
+    gx, gy = straight * car.ahead_x - lean * car.ahead_y, straight * car.ahead_y + lean * car.ahead_x
+    word.costate[0], word.costate[1] = c * gx - s * gy, s * gx + c * gy
+    return _keep(known, word, least)
 
 
 @inner
-def _three(car: Record, w: Between, a: End, b: End, sense: float, limit: float) -> float:
+def _three(
+    car: Record, w: Between, a: End, b: End, sense: float, limit: float, kept: Records, known: Known
+) -> Known:
     """LRL (sense 1) or RLR (-1), with a middle arc of less and of more than half a turn."""
     span = 4.0 * car.radius
     if w.near > span:
-        return math.inf
+        return known
     low, high = 2.0 * math.asin(w.near / span), 2.0 * math.asin(min(1.0, w.far / span))
-    best = min(limit, _looped(car, w, a, b, sense, TURN - high, TURN - low, limit))
-    return min(best, _looped(car, w, a, b, sense, low, high, best))
+    known = _looped(car, w, a, b, sense, TURN - high, TURN - low, limit, kept, known)
+    return _looped(car, w, a, b, sense, low, high, limit, kept, known)
 
 
 @inner
 def _looped(
-    car: Record, w: Between, a: End, b: End, sense: float, low: float, high: float, limit: float
-) -> float:
+    car: Record, w: Between, a: End, b: End, sense: float, low: float, high: float, limit: float,
+    kept: Records, known: Known,
+) -> Known:  # fmt: skip
     """LRL or RLR with a middle arc between two angles."""
     outer, middle = (car.rate[LEFT], car.rate[RIGHT]) if sense > 0 else (car.rate[RIGHT], car.rate[LEFT])
     cost = middle * low
     if cost >= limit:
-        return cost
+        return known
     dx, dy = sense * (car.right_x - car.left_x), sense * (car.right_y - car.left_y)
     arc, half = 0.5 * (low + high), 0.5 * (high - low)
     # The arm is (1 - exp(-i sense arc)) times that between the centres.
     heading = w.way - (math.atan2(dy, dx) + sense * 0.5 * (math.pi - arc))
     spread = w.spread + 0.5 * half
-    first = _least_turn(sense * (heading - a.theta), spread + a.turn)
-    last = _least_turn(sense * (b.theta - heading) + arc, spread + b.turn)
-    total = _least_above(first + last, sense * (b.theta - a.theta) + arc, a.turn + b.turn + half)
-    return cost + outer * total
+    first = _arc(sense * (heading - a.theta), spread + a.turn)
+    last = _arc(sense * (b.theta - heading) + arc, spread + b.turn)
+    arcs = first.least + last.least
+    total = _least_above(arcs, sense * (b.theta - a.theta) + arc, a.turn + b.turn + half)
+    least = cost + outer * total
+    if least >= limit:
+        return known
+    word = kept[known.kept]
+    _letters(word, sense, False, sense > 0)
+    word.short, word.long = low, high
+    if first.half >= WIDE or last.half >= WIDE:  # the outer arcs less the middle one are known all the same
+        angle, turn = sense * (b.theta - a.theta), a.turn + b.turn
+        if turn >= WIDE:
+            return _with(known, least)
+        turns = math.ceil((arcs - high - angle - turn) / TURN)
+        known = _with(known, cost + outer * (angle - turn + TURN * (turns + 1) + low))
+        word.spread, word.wound = math.inf, sense * TURN * turns
+        word.costate[0] = word.costate[1] = 0.0
+        return _keep(known, word, least)
+    if first.may_vanish:
+        known = _with(known, cost + outer * (arcs + first.middle - first.half + TURN))
+    if last.may_vanish:
+        known = _with(known, cost + outer * (arcs + last.middle - last.half + TURN))
+    _wind(word, a, b, sense * first.middle, -sense * arc, sense * last.middle)
+    word.spread = spread
+    word.opens, word.closes = first.may_vanish, last.may_vanish
+    pull = (
+        0.5 * (outer + middle) / car.radius / math.copysign(max(0.2, abs(math.cos(0.5 * arc))), math.pi - arc)
+    )
+    word.costate[0], word.costate[1] = pull * math.cos(w.way), pull * math.sin(w.way)
+    return _keep(known, word, least)
+
+
+@inner
+def _wind(word: Record, a: End, b: End, first: float, middle: float, last: float) -> None:
+    """The headings between arcs of so much, left positive, from that of the first box on."""
+    word.heading[0] = a.theta + first
+    word.heading[1] = word.heading[0] + middle
+    word.wound = TURN * round((word.heading[1] + last - b.theta) / TURN)
