@@ -91,7 +91,7 @@ SECTIONS = (
 )
 
 # What takes longest is begun first.
-LONG = ("loops", "sequences", "replay", "open-loop")
+LONG = ("fig8", "loops", "sequences", "replay", "open-loop")
 
 
 @dataclass(frozen=True)
