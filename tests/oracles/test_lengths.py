@@ -117,6 +117,22 @@ def test_fleet_lengths_are_the_cheapest_words(timed):
         assert costs[3, 0] == pytest.approx(best.cost, rel=SAME)
 
 
+def test_the_flat_points_of_a_fleet_go_the_shortest_dubins_paths():
+    """By the matrices of the poses, in the plane of complex numbers, and one path at a time."""
+    rng = np.random.default_rng(5)
+    fleet = random_fleet(rng, 4)
+    starts, goals = random_poses(rng, 6), random_poses(rng, 5)
+    costs = fleet_lengths(fleet, starts[:, None], goals, flat=True)
+    for car in range(4):
+        point, heading = complex(*0.5 * (fleet.left[car] + fleet.right[car])), complex(*fleet.direction[car])
+        for i, j in np.ndindex(6, 5):
+            places = [complex(*X[:2]) + np.exp(1j * X[2]) * point for X in (starts[i], goals[j])]
+            turns = [X[2] + np.angle(heading) for X in (starts[i], goals[j])]
+            ends = [(z.real, z.imag, turn) for z, turn in zip(places, turns, strict=True)]
+            radius = 0.5 * abs(complex(*(fleet.left[car] - fleet.right[car])))
+            assert costs[car, i, j] == pytest.approx(dubins.shortest_path(*ends, radius).length, rel=SAME)
+
+
 @pytest.mark.parametrize("timed", [False, True])
 def test_fleet_lengths_make_no_spurious_turn(timed):
     rng = np.random.default_rng(3)

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.pose import Array
-from ...steering import dubins
 from ...steering.fleet import Fleet
 from ...steering.free_heading import cheapest_headings
 from ...steering.six_words import WORD, Records, chain_cost
@@ -191,26 +190,9 @@ class Sequences:
 
     def table(self, starts: Array, goals: Array) -> Array:
         """Cost of every push from each start (n, 3) to each goal (m, 3), shape (k, n, m)."""
-        fleet = self.fleet
-        if self.flat:
-            return np.stack(
-                [
-                    dubins.shortest_length(
-                        self._flat(k, starts)[:, None], self._flat(k, goals)[None], fleet.radius[k]
-                    )
-                    for k in range(fleet.size)
-                ]
-            )
         from ...steering.lengths import fleet_lengths
 
-        return fleet_lengths(fleet, starts[:, None], goals[None])
-
-    def _flat(self, push: int, poses: Array) -> Array:
-        x, y = self.fleet.flat_point[push]
-        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        return np.column_stack(
-            [poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2] + self.fleet.heading[push]]
-        )
+        return fleet_lengths(self.fleet, starts[:, None], goals[None], flat=self.flat)
 
 
 def joined(pushes: np.ndarray, poses: Array) -> tuple[np.ndarray, Array]:

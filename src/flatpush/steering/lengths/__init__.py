@@ -53,12 +53,15 @@ def dubins_lengths(starts: ArrayLike, goals: ArrayLike, radius: float, threads: 
     return lengths.reshape(shape)
 
 
-def fleet_lengths(fleet: Fleet, starts: ArrayLike, goals: ArrayLike, threads: int | None = None) -> Array:
+def fleet_lengths(
+    fleet: Fleet, starts: ArrayLike, goals: ArrayLike, threads: int | None = None, flat: bool = False
+) -> Array:
     """Costs of the cheapest word of every car of a fleet between many poses of the object.
 
     Args:
         fleet: its rates, speeds and accelerations say what a cost is.
         starts, goals, threads: as in dubins_lengths; poses of the object frame.
+        flat: whether a cost is the length of the way of the flat point instead, of a Dubins car [m].
 
     Returns:
         Array of shape (k, ...): the cars, then the broadcast leading shape. Switching costs are not in it.
@@ -71,7 +74,8 @@ def fleet_lengths(fleet: Fleet, starts: ArrayLike, goals: ArrayLike, threads: in
     if not costs.size:
         return costs.reshape(fleet.size, *shape)
     for car in range(fleet.size):
-        _share(_car_filler(fleet, car, X, Y, costs[car]), table, threads, (starts, goals))
+        fill = (_flat_filler if flat else _car_filler)(fleet, car, X, Y, costs[car])
+        _share(fill, table, threads, (starts, goals))
     return costs.reshape(fleet.size, *shape)
 
 
@@ -125,6 +129,14 @@ def _car_filler(fleet: Fleet, car: int, X: Array, Y: Array, costs: Array) -> Cal
         return lambda bounds, tiles: three_twist_costs(X, Y, body, weighted, bounds, tiles, costs)
     body, timed = timed_car(fleet, car)
     return lambda bounds, tiles: timed_costs(X, Y, body, timed, bounds, tiles, costs)
+
+
+def _flat_filler(fleet: Fleet, car: int, X: Array, Y: Array, costs: Array) -> Callable[..., bool]:
+    from .kernels import Frame, Round, dubins_costs
+
+    (x, y), heading, radius = fleet.flat_point[car].tolist(), float(fleet.heading[car]), fleet.radius[car]
+    body = Frame(x, y, math.cos(heading), math.sin(heading), heading % (2 * math.pi))
+    return lambda bounds, tiles: dubins_costs(X, Y, body, Round(float(radius)), bounds, tiles, costs)
 
 
 def _share(
