@@ -1,9 +1,11 @@
 """What several journeys use."""
 
+import json
 import shutil
 
 import pytest
 from tests.extras import extra
+from tests.live_browser import Page
 from tests.live_server import EXAMPLES, Served
 
 
@@ -33,3 +35,16 @@ def browser(tmp_path_factory):
     )
     yield chromium
     chromium.quit()
+
+
+@pytest.fixture
+def page(browser, server):
+    """The page with its first plan; all that it asks for must be here, and its console silent."""
+    found = Page(browser, server)
+    yield found
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    asked = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    asked += [m["params"]["url"] for m in messages if m["method"] == "Network.webSocketCreated"]
+    local = ("data:", "blob:", "about:", f"http://{server.host}/", f"ws://{server.host}/")
+    assert [url for url in asked if not url.startswith(local)] == []
+    assert browser.get_log("browser") == []
