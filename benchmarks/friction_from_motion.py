@@ -1,8 +1,9 @@
-"""Friction from motion alone, in the simulator: python benchmarks/friction_from_motion.py N [SEED].
+"""Friction from motion alone, in the simulator: python benchmarks/friction_from_motion.py N [SEED [KIND…]].
 
 N random objects of each kind of support; each is pushed ten times for 100 mm by one finger within 35° of the normal,
 and seen at 30 Hz with 0.1 mm and 0.1° of noise. Printed: turning radii against the truth where they lie between a fifth
-and five times the size (below: absolute), friction, and how two-finger plans from the fitted table end on the true one.
+and five times the size (below: absolute), friction, and how two-finger plans from the fitted table end on the true one,
+executed straight from sample to sample: with the uncertainty that identify writes, without it, and without margin.
 """
 
 import sys
@@ -18,7 +19,8 @@ from flatpush.errors import FlatpushError
 from flatpush.friction import Support
 from flatpush.geometry import Outline, OutlinePoint, pose_error, rotate, transform
 from flatpush.identification import MotionFit, fit_motion, turning_radius
-from flatpush.problem import Object, Planning, Pusher, Scene
+from flatpush.planning.reserve import reserve
+from flatpush.problem import Object, Planning, Pusher, Scene, Uncertainty
 from flatpush.simulation.plant import Plant
 from flatpush.simulation.rollout import roll
 
@@ -101,33 +103,44 @@ def compared(fit: MotionFit, thing: Object) -> tuple[list[float], list[float]]:
     return relative, absolute
 
 
+def asked(thing: Object, margin: float) -> Scene:
+    """A scene in which two fingers bring the object to the origin."""
+    pusher = Pusher(fingers=2, spacing=0.012, tip_radius=TIP)
+    planning = Planning(iterations=300, friction_margin=margin)
+    return Scene(thing, (0.1, 0.0, 0.0), (0.0, 0.0, 0.0), pusher, planning=planning)
+
+
+def as_written(fit: MotionFit) -> Object:
+    """The fitted object with the uncertainty of its loads that identify writes."""
+    kept = reserve(fit, asked(fit.thing, 0.2))
+    return replace(fit.thing, uncertainty=Uncertainty(kept.loads) if kept and kept.loads else None)
+
+
 def plan_ends(
     rng: np.random.Generator, assumed: Object, thing: Object, margin: float
 ) -> tuple[float, float] | None:
     """Where a two-finger plan made for the assumed table ends on the true one [m, rad]; None if there is no plan."""
     start = np.array([*rng.uniform(-0.2, 0.2, 2), rng.uniform(-3, 3)])
-    planning = Planning(iterations=300, friction_margin=margin)
-    scene = Scene(
-        assumed, start, (0.0, 0.0, 0.0), Pusher(fingers=2, spacing=0.012, tip_radius=TIP), planning=planning
-    )
+    scene = replace(asked(assumed, margin), start=start)
     try:
         made = plan(scene)
     except FlatpushError:
         return None
     if made.status != "solved":
         return None
-    rolled = roll(made, [replace(made.scene, object=thing)], "exact", "arcs")
+    rolled = roll(made, [replace(made.scene, object=thing)], "exact", "samples")
     error = pose_error(rolled.final[0], scene.goal_pose)
     return float(np.hypot(*error[:2])), float(abs(error[2]))
 
 
-def main(count: int, seed: int) -> None:
+def main(count: int, seed: int, kinds: tuple[str, ...] = KINDS) -> None:
     every: dict[str, list[tuple[float, float] | None]] = {
         "fitted": [],
+        "fitted, loads taken as exact": [],
         "fitted, no margin": [],
         "uniform": [],
     }
-    for kind in KINDS:
+    for kind in kinds:
         relative, absolute, friction, spent = [], [], [], []
         for k in range(count):
             rng = np.random.default_rng([seed, KINDS.index(kind), k])
@@ -140,11 +153,15 @@ def main(count: int, seed: int) -> None:
             relative += errors[0]
             absolute += errors[1]
             friction.append(abs(fit.thing.friction / thing.friction - 1))
-            way = np.random.default_rng([seed, 9, k])
-            every["fitted"].append(plan_ends(way, fit.thing, thing, 0.2))
-            every["fitted, no margin"].append(plan_ends(way, fit.thing, thing, 0.0))
-            assumed = Object(thing.outline, "uniform", fit.thing.friction)
-            every["uniform"].append(plan_ends(way, assumed, thing, 0.2))
+            uniform = Object(thing.outline, "uniform", fit.thing.friction)
+            for what, assumed, margin in (
+                ("fitted", as_written(fit), 0.2),
+                ("fitted, loads taken as exact", fit.thing, 0.2),
+                ("fitted, no margin", fit.thing, 0.0),
+                ("uniform", uniform, 0.2),
+            ):
+                way = np.random.default_rng([seed, 9, k])
+                every[what].append(plan_ends(way, assumed, thing, margin))
             print(
                 f"{kind} {k}: {fit.pressure.name}, radii {_two(errors[0])}, μ {100 * friction[-1]:.1f} %,"
                 f" plan {every['fitted'][-1]}", flush=True,
@@ -178,4 +195,4 @@ def _two_mm(values: list[float]) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)
+    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0, tuple(sys.argv[3:]) or KINDS)

@@ -1,7 +1,7 @@
 """flatpush identify of recordings without forces: the table and the finger's friction from motion alone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +44,7 @@ def identify_motion(asked: Asked) -> int:
     from ..documents.motion_file import own_or_plain
     from ..identification import fit_motion, radii, suggest, summarise
     from ..planning.candidates import automatic_pushes
+    from ..planning.reserve import reserve
 
     motions: list[Motion] = []
     for path in asked.data:
@@ -68,15 +69,23 @@ def identify_motion(asked: Asked) -> int:
             if asked.suggest
             else ()
         )
+        kept = reserve(fit, scene)
+    if kept is not None and kept.untold:
+        summary = replace(summary, untold=(*summary.untold, kept.untold))
     if asked.output is not None:
         note = f"support and friction fitted to the motion of {len(set(fit.seen.stretches.push))} pushes"
         save_fitted_scene(
-            asked.scene, asked.output, support=fit.thing.support, friction=fit.thing.friction, note=note
+            asked.scene,
+            asked.output,
+            support=fit.thing.support,
+            friction=fit.thing.friction,
+            loads=0.0 if kept is None else kept.loads,
+            note=note,
         )
     if asked.as_json:
-        print_json(_document(fit, summary, names, found, next_))
+        print_json({**_document(fit, summary, names, found, next_), "reserve": kept and asdict(kept)})
         return 0
-    for line in _lines(fit, summary, names, found, next_):
+    for line in _lines(fit, summary, names, found, next_, "" if kept is None else kept.text):
         typer.echo(line)
     if asked.output is not None:
         typer.echo(f"wrote {asked.output}")
@@ -89,6 +98,7 @@ def _lines(
     names: Sequence[str],
     found: Sequence["Radius"],
     next_: Sequence["Suggestion"],
+    reserve: str,
 ) -> list[str]:
     place, turn = fit.seen.noise
     mm = 1000 * s.centre, 1000 * s.centre_sd
@@ -113,6 +123,7 @@ def _lines(
         if radius.value == radius.value:
             value = f"{1000 * radius.value:.1f} ± {1000 * radius.sd:.1f} mm"
         lines.append(f"  {name}: {value}")
+    lines += [reserve] if reserve else []
     lines += [f"not told: {text}" for text in s.untold]
     for k, one in enumerate(next_):
         x, y = 1000 * one.at.point

@@ -20,6 +20,7 @@ def save_fitted_scene(
     support: Support | None = None,
     friction: float | None = None,
     surface: LimitSurface | None = None,
+    loads: float = 0.0,
     note: str = "",
 ) -> None:
     """Writes the scene of a file with what was found of its friction, in the file's own units.
@@ -31,6 +32,7 @@ def save_fitted_scene(
         scene: the file that is changed. path: what is written.
         support: on feet, in O [m]. friction: coefficient between fingertip and object.
         surface: about the centre of friction, SI.
+        loads: the share by which the loads may differ, see Uncertainty.
         note: comments at the top, lines.
 
     Raises:
@@ -48,6 +50,14 @@ def save_fitted_scene(
         thing["support"] = _feet(support, per_metre)
     if friction is not None:
         thing["friction"] = float(f"{friction:.6g}")
+        known = dict(thing.get("uncertainty") or {})
+        if known.get("friction"):  # a range holds the coefficient
+            low, high = known["friction"]
+            known["friction"] = [min(low, thing["friction"]), max(high, thing["friction"])]
+        if loads > 0:
+            known["loads"] = loads
+        if known:
+            thing["uncertainty"] = known
     outline = thing.get("outline")
     if isinstance(outline, dict) and "file" in outline:
         drawing = Path(scene).parent / str(outline["file"])

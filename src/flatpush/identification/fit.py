@@ -20,8 +20,14 @@ from .motion import Frames, Motion, Seen, Stretches, look
 from .pressure import AbstractPressure, Density, FreeFeet, KnownFeet
 from .sensitivity import Sensitivity, Way, sensitivity
 
-# Feet that may stand anywhere are tried in these numbers.
-FREE = (3, 4, 6)
+# Feet that may stand anywhere are sought from so many down to so few. Their places have many minima: a fit starts from
+# the linear equations' loads, gathered from so many draws, and from those of the fit with a foot more that come nearest
+# when one is left out or two are put together.
+MOST_FEET, LEAST_FEET = 7, 3
+DRAWN, DRAWN_AGAIN, WITHOUT = 3, 1, 2
+# The search ends where a number of feet, at its best, is so much less likely than the best (2 log of the ratio): more
+# than two feet that differ by one in number have done in 25 random tables, or a start more that was drawn.
+UNLIKELIER = 80.0
 # Loads on known feet may be better known than SD_FOOT: statics tells those of three feet. How well is taken from the
 # data, of these standard deviations of their logarithms; of one that seems so much less likely there is no search.
 SD_FEET, HOPELESS = (0.1, 0.2), 6.0
@@ -74,6 +80,19 @@ class MotionFit:
         friction = float(self.thing.friction * np.exp(change[-1]))
         return Object(self.thing.outline, support, friction, None, self.thing.name)
 
+    def drawn(self, number: int, rng: np.random.Generator) -> list[Object]:
+        """Objects that explain the motion as well: of all families as likely as they are, of each within its spread.
+
+        Args:
+            number: how many. rng: what they are drawn with.
+        """
+        fits = (self, *self.others)
+        odds = np.exp([0.5 * (self.evidence - fit.evidence) for fit in fits])
+        chosen = [fits[k] for k in rng.choice(len(fits), size=number, p=odds / odds.sum())]
+        return [
+            fit.at(rng.multivariate_normal(np.zeros(len(fit.covariance)), fit.covariance)) for fit in chosen
+        ]
+
     @property
     def friction_sd(self) -> float:
         """Standard deviation of the friction coefficient."""
@@ -102,17 +121,55 @@ def fit_seen(seen: Seen, thing: Object, tip_radius: float, *, known_support: boo
     if known_support and len(thing.support.feet[0]):
         return _known_feet(seen, thing, tip_radius)
     density = Density(thing.outline)
-    start = density.mean
-    fits = [_fitted(density, start, seen, thing, tip_radius)]
-    around = density.at(start).places
-    loads = _linear(seen.frames, around, np.full(len(around), 1 / len(around)))
-    for count in FREE:
-        family = FreeFeet(thing.outline, count)
-        fits.append(
-            _fitted(family, family.numbers(*_gathered(around, loads, count)), seen, thing, tip_radius)
-        )
+    fits = [_fitted(density, density.mean, seen, thing, tip_radius)]
+    fits += _feet_anywhere(seen, thing, tip_radius, density.at(density.mean).places, fits[0].evidence)
     fits.sort(key=lambda fit: fit.evidence)
     return replace(fits[0], others=tuple(fits[1:]))
+
+
+def _feet_anywhere(
+    seen: Seen, thing: Object, tip_radius: float, around: Array, evidence: float
+) -> list[MotionFit]:
+    """The likeliest fit of each number of feet that may stand anywhere.
+
+    Args:
+        around: places where something may press (k, 2). evidence: of the likeliest fit so far.
+    """
+    loads = _linear(seen.frames, around, np.full(len(around), 1 / len(around)))
+    rng = np.random.default_rng(0)  # the same feet for the same motion
+    best: list[MotionFit] = []
+    for count in range(MOST_FEET, LEAST_FEET - 1, -1):
+        family = FreeFeet(thing.outline, count)
+        starts = [_gathered(rng, around, loads, count) for _ in range(DRAWN_AGAIN if best else DRAWN)]
+        if best:
+            starts += _with_one_fewer(best[-1], seen, tip_radius)[:WITHOUT]
+        fits = [_fitted(family, family.numbers(*start), seen, thing, tip_radius) for start in starts]
+        best.append(min(fits, key=lambda fit: fit.evidence))
+        evidence = min(evidence, best[-1].evidence)
+        if best[-1].evidence > evidence + UNLIKELIER:
+            break
+    return best
+
+
+def _with_one_fewer(fit: MotionFit, seen: Seen, tip_radius: float) -> list[tuple[Array, Array]]:
+    """Places and loads in which a foot of a fit is left out, or two are put together, those that explain most first."""
+    places, loads = fit.pressure.at(fit.numbers)[:2]
+    found = []
+    for i in range(len(loads)):
+        found.append((np.delete(places, i, axis=0), np.delete(loads, i) / (1 - loads[i])))
+        for j in range(i):
+            both, shares = places.copy(), loads.copy()
+            shares[j] += shares[i]
+            both[j] += loads[i] / shares[j] * (places[i] - places[j])
+            found.append((np.delete(both, i, axis=0), np.delete(shares, i)))
+    family = FreeFeet(fit.thing.outline, len(loads) - 1)
+    search = _Search(family, seen, fit.thing, tip_radius, float(np.log(fit.thing.friction)))
+
+    def cost(start: tuple[Array, Array]) -> float:
+        at = search.roll(np.append(family.numbers(*start), np.log(fit.thing.friction)))
+        return search._cost(at, at.covariance, 1.0)
+
+    return sorted(found, key=cost)
 
 
 def _known_feet(seen: Seen, thing: Object, tip_radius: float) -> MotionFit:
@@ -175,22 +232,20 @@ def _linear(frames: Frames, places: Array, expected: Array) -> Array:
     return np.asarray(w / w.sum())
 
 
-def _gathered(places: Array, loads: Array, count: int) -> tuple[Array, Array]:
-    """So many feet that stand for loads at places: weighted k-means, begun far apart."""
-    chosen = [int(np.argmax(loads))]
+def _gathered(rng: np.random.Generator, places: Array, loads: Array, count: int) -> tuple[Array, Array]:
+    """So many feet that stand for loads at places, each for those next to it: begun where loads are, far apart."""
+    weights = loads + 0.1 / len(loads)
+    chosen = [int(rng.choice(len(weights), p=weights / weights.sum()))]
     for _ in range(count - 1):
-        away = np.min(np.linalg.norm(places[:, None] - places[chosen][None], axis=2), axis=1)
-        chosen.append(int(np.argmax(away**2 * (loads + 0.1 / len(loads)))))
-    feet = places[chosen].copy()
-    weights = loads + 1e-4 / len(loads)
-    for _ in range(20):
-        owner = np.argmin(np.linalg.norm(places[:, None] - feet[None], axis=2), axis=1)
-        for i in range(count):
-            mine = owner == i
-            if mine.any():
-                feet[i] = np.average(places[mine], axis=0, weights=weights[mine])
-    shares = np.array([weights[owner == i].sum() for i in range(count)])
-    return feet, np.maximum(shares, 0.02) / np.maximum(shares, 0.02).sum()
+        away = np.min(np.linalg.norm(places[:, None] - places[chosen][None], axis=2), axis=1) ** 2 * weights
+        chosen.append(int(rng.choice(len(away), p=away / away.sum())))
+    feet, weights = places[chosen], loads + 1e-4 / len(loads)
+    owner = np.argmin(np.linalg.norm(places[:, None] - feet[None], axis=2), axis=1)
+    feet = np.array(
+        [np.average(places[owner == i], axis=0, weights=weights[owner == i]) for i in range(count)]
+    )
+    shares = np.maximum([weights[owner == i].sum() for i in range(count)], 0.02)
+    return feet, shares / shares.sum()
 
 
 def _first_friction(frames: Frames, places: Array, loads: Array, expected: float) -> float:
@@ -277,7 +332,7 @@ class _Search:
         friction = float(np.exp(at.z[-1]))
         thing = Object(self.thing.outline, support, friction, None, self.thing.name)
         evidence = 2 * self._cost(at, at.covariance, 1.0) + float(np.linalg.slogdet(H)[1])
-        evidence -= float(np.sum(np.log(self.precision)))
+        evidence -= float(np.sum(np.log(self.precision))) + 2 * self.family.ways
         n = int(np.count_nonzero(at.good))
         return MotionFit(
             thing,

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from math import lgamma
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,11 @@ class AbstractPressure(ABC):
     """
 
     name: str
+
+    @property
+    def ways(self) -> float:
+        """The logarithm of the number of ways in which the numbers can be written for one pressure."""
+        return 0.0
 
     @property
     @abstractmethod
@@ -145,6 +151,10 @@ class FreeFeet(AbstractPressure):
     @property
     def name(self) -> str:  # type: ignore[override]
         return f"{self.count} feet"
+
+    @property
+    def ways(self) -> float:
+        return lgamma(self.count + 1)  # feet in any order
 
     @property
     def mean(self) -> Array:
