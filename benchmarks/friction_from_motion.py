@@ -19,6 +19,8 @@ from flatpush.errors import FlatpushError
 from flatpush.friction import Support
 from flatpush.geometry import Outline, OutlinePoint, pose_error, rotate, transform
 from flatpush.identification import MotionFit, fit_motion, turning_radius
+from flatpush.identification.fit import _fitted
+from flatpush.identification.pressure import FreeFeet
 from flatpush.planning.reserve import reserve
 from flatpush.problem import Object, Planning, Pusher, Scene, Uncertainty
 from flatpush.simulation.plant import Plant
@@ -103,6 +105,13 @@ def compared(fit: MotionFit, thing: Object) -> tuple[list[float], list[float]]:
     return relative, absolute
 
 
+def from_truth(fit: MotionFit, thing: Object) -> MotionFit:
+    """The fit of as many feet as there are, begun where they stand: no search of the same numbers finds more."""
+    places, loads = thing.support.feet
+    family = FreeFeet(thing.outline, len(loads))
+    return _fitted(family, family.numbers(places, loads / loads.sum()), fit.seen, fit.thing, TIP)
+
+
 def asked(thing: Object, margin: float) -> Scene:
     """A scene in which two fingers bring the object to the origin."""
     pusher = Pusher(fingers=2, spacing=0.012, tip_radius=TIP)
@@ -142,6 +151,7 @@ def main(count: int, seed: int, kinds: tuple[str, ...] = KINDS) -> None:
     }
     for kind in kinds:
         relative, absolute, friction, spent = [], [], [], []
+        best: tuple[list[float], list[float]] = [], []
         for k in range(count):
             rng = np.random.default_rng([seed, KINDS.index(kind), k])
             thing = random_object(rng, kind)
@@ -152,6 +162,9 @@ def main(count: int, seed: int, kinds: tuple[str, ...] = KINDS) -> None:
             errors = compared(fit, thing)
             relative += errors[0]
             absolute += errors[1]
+            if kind == "unknown feet":
+                for of, more in zip(best, compared(from_truth(fit, thing), thing), strict=True):
+                    of += more
             friction.append(abs(fit.thing.friction / thing.friction - 1))
             uniform = Object(thing.outline, "uniform", fit.thing.friction)
             for what, assumed, margin in (
@@ -172,6 +185,8 @@ def main(count: int, seed: int, kinds: tuple[str, ...] = KINDS) -> None:
             f" ({max(spent):.1f} at most)",
             flush=True,
         )
+        if best[0]:
+            print(f"  begun at the truth: {_two(best[0])}; small ones {_two_mm(best[1])}", flush=True)
     for what, ends in every.items():
         made = np.array([end for end in ends if end is not None])
         if not len(made):
