@@ -1,5 +1,6 @@
 """Automatic pushes: the same for the same object however it is written, and quick for many corners."""
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -161,3 +162,27 @@ def test_a_push_is_called_after_the_side_where_it_pushes() -> None:
         winds = {"east": (1, 0), "north": (0, 1), "west": (-1, 0), "south": (0, -1)}
         looks = sum(np.array(winds[wind]) for wind in name.split()[0].split("-"))
         assert -normal @ looks / np.linalg.norm(looks) > np.cos(np.deg2rad(22.6)), name
+
+
+def test_places_are_compared_by_the_turns_that_are_proved() -> None:
+    """Where the nominal table turns tightest a set of tables may not: the first place that was proved was taken."""
+    feet = fp.Support.points(
+        [(0.02, 0.012), (-0.018, 0.014), (-0.02, -0.012), (0.004, -0.014)], [1.0, 0.7, 1.2, 0.9]
+    )
+    outline = [(0.03, -0.02), (0.03, 0.02), (-0.03, 0.02), (-0.03, -0.02)]
+    thing = fp.Object(outline, feet, friction=0.4, uncertainty=fp.Uncertainty(0.2))
+    radii = {}
+    for proof in ("set", "nominal"):
+        scene = fp.Scene(
+            thing,
+            (0.1, 0.0, 0.0),
+            pusher=fp.Pusher(fingers=2, spacing=0.014),
+            planning=fp.Planning(proof=proof),
+        )
+        pushes, _ = automatic_pushes(scene)
+        proved = fp.Planner(dataclasses.replace(scene, pushes=pushes, planning=fp.Planning(proof="set")))
+        radii[proof] = {option.push.name: option.car.radius for option in proved.usable}
+    assert set(radii["nominal"]) <= set(radii["set"])
+    ratios = [radii["set"][name] / radius for name, radius in radii["nominal"].items()]
+    assert max(ratios) <= 1 + 1e-9
+    assert min(ratios) < 0.9

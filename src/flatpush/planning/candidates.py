@@ -24,6 +24,8 @@ MOST = 8
 MANY, SIMPLE, FINER = 30, 5e-4, 5e-5
 # Then places on a stretch are tried around the best of a quick guess, in fractions of its length, and closer by.
 AROUND, CLOSER = (0.0, -0.15, 0.15), 0.06
+# How many places of a stretch are proved for a set of tables, and how far apart they are, by the outline's size.
+PROVED, APART = 4, 0.04
 # On the outline itself, places beside that are tried, in parts SIMPLE of the size.
 BESIDE = 0.2  # of an edge, next to a corner where the normal passes the COF
 ASIDE = (0.3, 2, -2, 6, -6, 12, -12)
@@ -280,18 +282,34 @@ def _nominal(scene: Scene) -> Scene:
 
 
 def _proved(scene: Scene, options: list[PushOption]) -> PushOption:
-    """The first of a nominal scene's pushes, best first, that can be made on all tables that the scene asks for."""
+    """Of a nominal scene's pushes, best first, the one that turns tightest on all tables that the scene asks for.
+
+    Where the nominal table turns tightest others may not, so some places apart are proved; none turns tighter proved.
+    """
     if not proved_for_set(scene) or options[0].car is None:
         return options[0]
-    proved = (push_option(scene, o.push) for o in options if o.car is not None)
-    first = next(proved)
-    return first if first.car is not None else next((o for o in proved if o.car is not None), first)
+    apart, found, radii = APART * scene.object.outline.size, [], []
+    refused: PushOption | None = None
+    for option in options:
+        at = option.push.at.point
+        if option.car is None or any(np.hypot(*(at - o.push.at.point)) < apart for o in found):
+            continue
+        if len(found) == PROVED or option.car.radius >= min(radii, default=np.inf):
+            break
+        proved = push_option(scene, option.push)
+        if proved.car is None:
+            refused = refused or proved
+        else:
+            found.append(proved)
+            radii.append(proved.car.radius)
+    return found[_first(np.array(radii))] if found else refused or options[0]
 
 
 def _best(scene: Scene, stretch: Stretch) -> PushOption | None:
     """Coarse search over the stretch, then golden section around its best.
 
-    Places are compared on the nominal table; the best that holds on all tables of a set is taken where that is asked.
+    Places are compared on the nominal table; of the best the one is taken that is best on all tables of a set, where
+    that is asked.
     """
     tried: dict[float, PushOption] = {}
     nominal = _nominal(scene)
