@@ -288,8 +288,9 @@ def _proved(scene: Scene, options: list[PushOption]) -> PushOption:
     """
     if not proved_for_set(scene) or options[0].car is None:
         return options[0]
-    apart, found, radii = APART * scene.object.outline.size, [], []
-    refused: PushOption | None = None
+    apart, refused = APART * scene.object.outline.size, None
+    found: list[PushOption] = []
+    radii: list[float] = []
     for option in options:
         at = option.push.at.point
         if option.car is None or any(np.hypot(*(at - o.push.at.point)) < apart for o in found):
