@@ -5,6 +5,7 @@ import pytest
 
 import flatpush as fp
 from flatpush.simulation.plant import MODES, Plant
+from flatpush.simulation.plant.runner import Runner
 
 TRIANGLE = [(0.019667, -0.0095), (0.019667, 0.019), (-0.039333, -0.0095)]
 HOOK = [(0.0, 0.0), (0.06, 0.0), (0.06, 0.04), (0.04, 0.04), (0.04, 0.02), (0.0, 0.02)]
@@ -69,6 +70,40 @@ def test_the_pushes_that_are_compared_show_every_event():
                     corners += sum(len(set(np.array(e)[~free[:, i]])) > 1 for i, e in enumerate(edges))
     assert {"touch", "loss", "sticking", "sliding_left", "sliding_right", "separation"} <= seen
     assert corners >= 2
+
+
+@pytest.mark.parametrize("body", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_only_where_fingers_touch_in_three_places_does_a_run_go_the_plain_way(monkeypatch, body):
+    """Two fingers come down on the hook's inner side, one of them in its corner, push, and leave the corner again."""
+    thing = fp.Object(
+        SHAPES["concave"], fp.Support.points([(0.01, 0.01), (0.05, 0.01), (0.05, 0.03)]), friction=0.3
+    )
+    down = [[0.028, 0.03 - 0.001 * k, -np.pi / 2] for k in range(8)]
+    into = [[0.028 + 0.0004 * k, 0.0223 - 0.0003 * k, -np.pi / 2] for k in range(8)]
+    back = [[0.0305 - 0.0006 * k, 0.0202 - 0.0004 * k, -np.pi / 2 - 0.01 * k] for k in range(8)]
+    way, starts = np.array(down + into + back), [[0, 0, 0], [0.001, 0, 0], [0, 0.2, 0]]
+    plain = []
+    real = Runner._plainly
+    monkeypatch.setattr(
+        Runner, "_plainly", lambda *args: (plain.append(len(args[1].hands[0])), real(*args))[1]
+    )
+    fast, slow = (Plant(thing, TIPS[2], 0.0025, model="ellipsoid", plain=p) for p in (False, True))
+    got = fast.many(starts, way, record=True, body=body)
+    assert 0 < sum(n - 1 for n in plain) < 0.5 * len(way) * len(starts)
+    last = fast.many(starts, way, body=body)
+    want = slow.many(starts, way, record=True, body=body)
+    assert np.array_equal(got.outcome, want.outcome)
+    assert got.object == pytest.approx(want.object, abs=AGREE)
+    assert np.array_equal(got.modes, want.modes)
+    assert np.array_equal(got.stuck, want.stuck)
+    assert np.array_equal(last.final, got.final)
+    assert np.array_equal(last.stuck, got.stuck)
+    # By itself, step by step, too.
+    state = fast.start(starts[1], way[0])
+    for k in range(1, len(way)):
+        state = fast.step(state, way[k] - way[k - 1], 1.0)
+    if not body:
+        assert state.object == pytest.approx(want.final[1], abs=AGREE)
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ from .arrays import (
     scratch,
     surface_arrays,
 )
-from .codes import AS_IT_IS, MANY, STRAIGHT, UNDECIDED
+from .codes import AS_IT_IS, GOING, MANY, STRAIGHT, UNDECIDED
 from .plain import Fingers
 
 Codes = NDArray[np.integer]
@@ -94,6 +94,16 @@ class Task(NamedTuple):
     cofs: Array | None = None
     surfaces: Sequence[LimitSurface] | None = None
 
+    def of_run(self, r: int) -> "Task":
+        """The task of one of its runs alone."""
+
+        def own(values: Any) -> Any:
+            return None if values is None else values[r % len(values)][None]
+
+        surfaces = None if self.surfaces is None else [self.surfaces[r % len(self.surfaces)]]
+        starts, hands, frictions, cofs = map(own, (self.starts, self.hands, self.frictions, self.cofs))
+        return self._replace(starts=starts, hands=hands, frictions=frictions, cofs=cofs, surfaces=surfaces)
+
 
 class Done(NamedTuple):
     """Runs: X_WO (n, rows, 3), SEEN rows as numbers (n, rows, k, 5), codes of the outcomes and numbers of poses reached
@@ -103,6 +113,28 @@ class Done(NamedTuple):
     seen: Array
     ends: Codes
     hands: Array
+
+    @classmethod
+    def of(cls, task: Task, fingers: int) -> "Done":
+        """Room for the runs of a task, none of them made."""
+        n = len(task.starts)
+        seen, ends = np.zeros((n, task.rows, fingers, _SEEN)), np.tile([MANY, 0], (n, 1))
+        return cls(np.empty((n, task.rows, 3)), seen, ends, task.hands[-1, 0].copy())
+
+    def take(self, found: "Done", at: int, begin: int) -> None:
+        """Takes the rows of one run from `begin` on over, as those from `at` on and all after."""
+        self.poses[:, at:], self.seen[:, at:] = found.poses[:, -1:], found.seen[:, -1:]
+        stop = at + found.poses.shape[1] - begin
+        self.poses[:, at:stop], self.seen[:, at:stop] = found.poses[:, begin:], found.seen[:, begin:]
+        self.hands[:] = found.hands
+
+    def put(self, done: "Done", r: int) -> None:
+        """Writes a run of which every row is kept as run r of others, of which every row is kept or the last."""
+        rows = done.poses.shape[1]
+        done.poses[r], done.seen[r], done.ends[r] = self.poses[0, -rows:], self.seen[0, -rows:], self.ends[0]
+        if rows == 1:
+            done.modes[r, ..., 1] = np.bitwise_or.reduce(self.modes[0, ..., 1], axis=0)
+        done.hands[:] = self.hands
 
     @property
     def points(self) -> Array:
@@ -194,24 +226,57 @@ class Runner:
         Raises:
             InputError: for surfaces of several kinds or sizes.
         """
-        n, k = len(task.starts), len(self._plain.tips)
-        ends = np.tile([MANY, 0], (n, 1))
-        seen = np.zeros((n, task.rows, k, _SEEN))
-        done = Done(np.empty((n, task.rows, 3)), seen, ends, task.hands[-1, 0].copy())
+        n = len(task.starts)
+        done = Done.of(task, len(self._plain.tips))
         surfaces = None if self._surface is None else [self._surface]
         if surfaces and task.surfaces is not None:
             known = all(map(compilable, task.surfaces))
             surfaces = [surface_arrays(s) for s in task.surfaces] if known else None
         if surfaces and n:
-            kind = type(surfaces[0])
-            if kind not in _ready:
-                _interpreted[kind] = _interpreted.get(kind, 0.0) + n * self._work(task.hands)
-            late = kind in _ready or _interpreted[kind] > PATIENCE
-            if late or not self._interpreted(task, surfaces, done):
-                self._compiled(task, surfaces, threads, done)
-        for r in np.flatnonzero(ends[:, 0] >= MANY).tolist():
-            self._plainly(task, r, done)
+            self._made(task, surfaces, threads, done)
+        for r in np.flatnonzero(done.ends[:, 0] >= MANY).tolist():
+            if surfaces:
+                self._past(task, r, surfaces[r % len(surfaces)], done)
+            else:
+                self._plainly(task, r, done)
         return done
+
+    def _made(self, task: Task, surfaces: Sequence[SurfaceArrays], threads: int | None, done: Done) -> None:
+        """The runs by the steps, up to where these cannot decide."""
+        kind = type(surfaces[0])
+        if kind not in _ready:
+            _interpreted[kind] = _interpreted.get(kind, 0.0) + len(task.starts) * self._work(task.hands)
+        late = kind in _ready or _interpreted[kind] > PATIENCE
+        if late or not self._interpreted(task, surfaces, done):
+            self._compiled(task, surfaces, threads, done)
+
+    def _past(self, task: Task, r: int, surface: SurfaceArrays, done: Done) -> None:
+        """A run that the steps could not decide: from pose to pose by them, and where they cannot the plain way."""
+        way, fingers = task.hands[r % len(task.hands)], len(self._plain.tips)
+        count, rest = len(way), task.of_run(r)._replace(rows=len(way))
+        whole, at, status = Done.of(rest, fingers), task.begin, GOING
+        while at < count and status == GOING:
+            begin = min(at, 1)
+            rest = rest._replace(hands=way[None, at - begin :], rows=count - at + begin, begin=begin)
+            found = Done.of(rest, fingers)
+            self._made(rest, [surface], 1, found)
+            status, reached = found.ends[0].tolist()
+            whole.take(found, at, begin)
+            at += reached
+            if status >= MANY:
+                q = whole.poses[:, at - 1] if reached else rest.starts
+                begin = min(at, 1)
+                step = rest._replace(
+                    starts=q, hands=way[None, at - begin : at + 1], rows=1 + begin, begin=begin
+                )
+                found = Done.of(step, fingers)
+                self._plainly(step, 0, found)
+                status, reached = found.ends[0].tolist()
+                whole.take(found, at, begin)
+                at += reached
+            rest = rest._replace(starts=whole.poses[:, at - 1], push_out=False)
+        whole.ends[0] = status, at - task.begin
+        whole.put(done, r)
 
     def _work(self, hands: Array) -> float:
         """Steps that a run takes at least."""
