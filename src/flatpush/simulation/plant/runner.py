@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,15 +64,19 @@ class _Tired(Exception):
     """Interpreting has taken too long."""
 
 
-class _Watched(list[Row]):
+class _Watched(Sequence[Row]):
     """Rows that the interpreter writes to, up to a time of its thread [s]."""
 
-    until = np.inf
+    def __init__(self, rows: Sequence[Row], until: float) -> None:
+        self._rows, self._until = rows, until
 
-    def __getitem__(self, index: Any) -> Any:
-        if time.thread_time() > self.until:
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: int) -> Row:  # type: ignore[override]
+        if time.thread_time() > self._until:
             raise _Tired
-        return super().__getitem__(index)
+        return self._rows[index]
 
 
 class Task(NamedTuple):
@@ -97,12 +101,17 @@ class Task(NamedTuple):
     def of_run(self, r: int) -> "Task":
         """The task of one of its runs alone."""
 
-        def own(values: Any) -> Any:
-            return None if values is None else values[r % len(values)][None]
+        return self._replace(
+            starts=_single(self.starts, r),
+            hands=_single(self.hands, r),
+            frictions=None if self.frictions is None else _single(self.frictions, r),
+            cofs=None if self.cofs is None else _single(self.cofs, r),
+            surfaces=None if self.surfaces is None else [self.surfaces[r % len(self.surfaces)]],
+        )
 
-        surfaces = None if self.surfaces is None else [self.surfaces[r % len(self.surfaces)]]
-        starts, hands, frictions, cofs = map(own, (self.starts, self.hands, self.frictions, self.cofs))
-        return self._replace(starts=starts, hands=hands, frictions=frictions, cofs=cofs, surfaces=surfaces)
+
+def _single(values: Array, r: int) -> Array:
+    return values[r % len(values)][None]
 
 
 class Done(NamedTuple):
@@ -334,8 +343,9 @@ class Runner:
         ways = [plain_rows(records(POSE, way.reshape(-1, 3))) for way in task.hands]
         outline, fingers, own = self._rows
         plain = [own if own and arrays is self._surface else interpreted(arrays) for arrays in surfaces]
-        out, seen = _Watched(blank(POSE, task.rows)), blank(SEEN, task.rows * len(fingers))
-        out.until = began + ENOUGH - _spent.get(kind, 0.0)
+        rows = blank(POSE, task.rows)
+        out = _Watched(rows, began + ENOUGH - _spent.get(kind, 0.0))
+        seen = blank(SEEN, task.rows * len(fingers))
         start = blank(POSE, 1)[0]
         for r, pose in enumerate(task.starts.tolist()):
             made, way = self._of_run(task, r), ways[r % len(ways)]
@@ -353,7 +363,7 @@ class Runner:
             except (ArithmeticError, ValueError):  # where the compiled formulas go on with inf or nan
                 done.ends[r] = UNDECIDED, 0
                 continue
-            done.poses[r] = [(q.x, q.y, q.angle) for q in out]
+            done.poses[r] = [(q.x, q.y, q.angle) for q in rows]
             done.seen[r, ..., :3] = np.reshape([(s.x, s.y, s.gap) for s in seen], (task.rows, -1, 3))
             done.modes[r] = np.reshape([(s.mode, s.modes) for s in seen], (task.rows, -1, 2))
             done.hands[:] = [(h.x, h.y, h.angle) for h in room.hands[:count]]
