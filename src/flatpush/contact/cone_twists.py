@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..errors import NoDubinsReduction
 from ..friction.exact import Exact
-from ..friction.quartic import Quartic
 from ..friction.support import Support
 from ..friction.surface import LimitSurface
 from ..geometry import cross, perpendicular, velocity_at
@@ -23,10 +22,11 @@ ON_FACE = 1
 # Fingers that go straight from sample to sample turn the object about points up to so far from the planned one [m]:
 # planning.segments samples turns so finely. Feet so near to the centre may then resist in any direction.
 OFF_CENTRE = 2.5e-4
-# In such turns a force may miss the cone by this angle [rad]: what motions without a margin miss it by, which slip a
-# little. A turn about a foot, or where a quartic bends as sharply, misses it by far more.
-MISSED = math.radians(1.0)
-# Directions [rad] in which the turning centre is off under a quartic, and beside the worst of them.
+# In such turns a force may miss the cone by this angle [rad], or less with a margin, from RESERVE on by nothing: what
+# motions without a margin miss it by, which slip a little. A turn about a foot, or where a quartic or a local ellipsoid
+# bends as sharply, misses it by far more.
+MISSED, RESERVE = math.radians(1.0), 0.02
+# Directions [rad] in which the turning centre is off under a smooth surface, and beside the worst of them.
 AROUND, BESIDE = np.pi / 4 * np.arange(8), np.pi / 14 * np.array([-1.0, -0.5, 0.5, 1.0])
 # How far a wrench is moved at once, of its way to the straight one, and how exactly the end of that is found.
 MOVED, FOUND = 1 / 64, 1 / 1024
@@ -81,7 +81,8 @@ def cone_twists(
             )
         )
     towards = np.asarray(sum(F / np.linalg.norm(F[:2]) for F in pair))
-    lefts, rights = _turns(cone, inner, surface, towards, 0 if quick else ON_FACE)
+    missed = math.sin(MISSED) * max(0.0, 1 - margin / RESERVE)
+    lefts, rights = _turns(cone, inner, surface, towards, 0 if quick else ON_FACE, missed)
     left, right = _tightest(lefts, rights, hand, cost)
     straight = _between(inner, surface, left, right, pair)
     a, b = _centres(np.stack([left, right]))
@@ -113,7 +114,7 @@ def _beside(cone: WrenchCone, rest: str) -> str:
 
 
 def _turns(
-    cone: WrenchCone, inner: WrenchCone, surface: LimitSurface, towards: Array, between: int
+    cone: WrenchCone, inner: WrenchCone, surface: LimitSurface, towards: Array, between: int, missed: float
 ) -> tuple[Array, Array]:
     """Twists of wrenches on the narrowed cone, left turns (ω = 1) and right turns (ω = -1).
 
@@ -126,8 +127,8 @@ def _turns(
     parts = np.arange(between + 1) / (between + 1)
     wrenches = np.concatenate([(1 - s) * rays + s * nexts for s in parts])
     twists = surface.twist(wrenches)
-    for i in np.flatnonzero(~_held(cone, surface, twists)):
-        twists[i] = _nearer(cone, surface, wrenches[i], towards)
+    for i in np.flatnonzero(~_held(cone, surface, twists, missed)):
+        twists[i] = _nearer(cone, surface, wrenches[i], towards, missed)
     kept = twists[:, 2] != 0
     turns = twists[kept] / np.abs(twists[kept, 2:])
     lefts, rights = turns[turns[:, 2] > 0], turns[turns[:, 2] < 0]
@@ -136,31 +137,34 @@ def _turns(
     return lefts, rights
 
 
-def _nearer(cone: WrenchCone, surface: LimitSurface, F: Array, towards: Array) -> Array:
+def _nearer(cone: WrenchCone, surface: LimitSurface, F: Array, towards: Array, missed: float) -> Array:
     """The twist of the nearest wrench on the way from F to the straight one that is held; zero if none is."""
 
     def twist(way: float) -> Array:
         return surface.twist((1 - way) * F + way * towards)
 
     low, high, step = 0.0, MOVED, MOVED
-    while not _held(cone, surface, twist(high)[None])[0]:
+    while not _held(cone, surface, twist(high)[None], missed)[0]:
         step *= 2
         low, high = high, high + step
         if high >= 1:
             return np.zeros(3)
     while high - low > FOUND:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _held(cone, surface, twist(middle)[None])[0] else (middle, high)
+        low, high = (low, middle) if _held(cone, surface, twist(middle)[None], missed)[0] else (middle, high)
     return twist(high)
 
 
-def _held(cone: WrenchCone, surface: LimitSurface, twists: Array) -> NDArray[np.bool_]:
-    """Whether a cone holds the turns about all points within OFF_CENTRE of those of twists (n, 3), shape (n,)."""
+def _held(cone: WrenchCone, surface: LimitSurface, twists: Array, missed: float) -> NDArray[np.bool_]:
+    """Whether a cone holds the turns about all points within OFF_CENTRE of those of twists (n, 3), shape (n,).
+
+    Of a surface without feet, to within a part `missed` of the wrench.
+    """
     turns = twists[:, 2] != 0
-    held = np.ones(len(twists), dtype=bool)  # what is as smooth as an ellipsoid changes little so near
+    held = np.ones(len(twists), dtype=bool)  # an exact surface without feet changes little so near
     if isinstance(surface, Exact) and surface.has_facets:
         held[turns] = [_held_by_feet(cone, surface.support, V) for V in twists[turns]]
-    elif isinstance(surface, Quartic) and turns.any():
+    elif not isinstance(surface, Exact) and turns.any():
 
         def depths(directions: Array) -> Array:
             off = OFF_CENTRE * np.stack([np.sin(directions), -np.cos(directions), 0 * directions], axis=-1)
@@ -168,7 +172,7 @@ def _held(cone: WrenchCone, surface: LimitSurface, twists: Array) -> NDArray[np.
 
         found = depths(np.broadcast_to(AROUND, (int(turns.sum()), len(AROUND))))
         near = depths(AROUND[np.argmin(found, axis=1), None] + BESIDE)
-        held[turns] = np.minimum(found.min(axis=1), near.min(axis=1)) >= -math.sin(MISSED)
+        held[turns] = np.minimum(found.min(axis=1), near.min(axis=1)) >= -max(missed, CLOSED)
     return held
 
 
