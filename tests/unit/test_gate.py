@@ -74,6 +74,20 @@ def retimed(segment, factor):
     segment["times"] = [factor * t for t in segment["times"]]
 
 
+def hurried(segment):
+    """Full speed at once: a hand that stands for an instant at every sample, shorter than places can be told apart."""
+    P = np.array(segment["pusher"])
+    P = np.column_stack([P, segment.get("height", np.zeros(len(P)))])
+    steps = np.abs(np.diff(P, axis=0))
+    ways = np.hypot(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 3]) + 0.2 * steps[:, 2]
+    speed = 0.1 if segment["kind"] == "transit" else 0.01
+    begin = np.concatenate([[0.0], np.cumsum(ways / speed + 1e-13)])
+    segment["times"] = [t + dt for t in begin.tolist() for dt in (0.0, 1e-14)]
+    for key in ("object", "pusher", "height"):
+        if key in segment:
+            segment[key] = [value for value in segment[key] for _ in range(2)]
+
+
 def edited(document, edit):
     d = copy.deepcopy(document)
     S = d["segments"]
@@ -84,6 +98,7 @@ def edited(document, edit):
         "between": transits[1],
         "n": len(transits[0]["times"]) // 2,
         "retimed": retimed,
+        "hurried": hurried,
         "thinned": thinned,
     }
     exec(edit, names)
@@ -117,6 +132,25 @@ def test_a_dangerous_edit_is_refused(documents, case):
         return
     failed = [claim.name for claim in fp.verify(parse_plan(changed)).failed]
     assert any(case["claim"] in name for name in failed), failed
+
+
+@pytest.mark.parametrize("walled", [False, True])
+def test_a_hand_that_moves_where_nothing_is_to_be_pushed_is_refused(walled):
+    """There is no push whose fingers could be looked at."""
+    box = (-0.3, -0.3, 0.3, 0.3) if walled else None
+    there = fp.Scene(fp.Object(BLOCK, friction=0.4), (0, 0, 0), workspace=fp.Workspace(box))
+    document = plan_document(fp.plan(there))
+    assert document["segments"] == []
+    through = {
+        "kind": "transit",
+        "pusher": [[-0.1, 0, 0], [0.1, 0, 0]],
+        "height": [0.0, 0.0],
+        "times": [0.0, 9.0],
+    }
+    document.update(segments=[through], duration=9.0)
+    document["certificate"]["duration"] = 9.0
+    failed = [claim.name for claim in fp.verify(parse_plan(document)).failed]
+    assert failed == ["executed: transits without a push"]
 
 
 def test_there_are_enough_edits():

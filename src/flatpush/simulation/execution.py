@@ -29,6 +29,8 @@ SAME = 1e-9
 ROLLED = 1e-6
 # A limit may be passed by this part, and by what the rounding of places (in parts of their size) makes of it.
 SLACK, ROUNDING = 1e-6, 1e-15
+# Velocities change from step to step of so much time at least [s].
+BRIEF = 1e-9
 # Between samples the hand is looked at after every turn of so much [rad]: for what is in the way, and for how fast the
 # fingertips are, where a step of so little turn counts by its ends.
 TURN, CHORD = 0.02, 0.5
@@ -125,6 +127,8 @@ def _order(segments: Sequence[Segment]) -> Iterator[Finding]:
     kinds = [s.kind for s in segments]
     missing = 0 if not kinds else (kinds[0] != "transit") + (kinds[-1] != "transit")
     yield Finding("first and last transit missing", missing, 0, "", "the plan's ends")
+    alone = bool(kinds) and not _on_table(segments)
+    yield Finding("transits without a push", float(alone), 0.0, "", "the plan")
     for k, (a, b) in enumerate(pairwise(segments)):
         if not isinstance(a, TransitSegment) and not isinstance(b, TransitSegment):
             yield Finding(
@@ -334,6 +338,20 @@ def _fine(poses: Array, turn: float) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate([moved, poses[-1:]]), which
 
 
+def _begins(times: Array) -> NDArray[np.intp]:
+    """Where steps begin of which each takes BRIEF at least: those that are shorter are one with the next ones.
+
+    The rounding of places would make any velocity of them.
+    """
+    begin, since = [], np.inf
+    for k, dt in enumerate(times.tolist()):
+        if since >= BRIEF:
+            begin.append(k)
+            since = 0.0
+        since += dt
+    return np.array(begin[:-1] if since < BRIEF and len(begin) > 1 else begin, dtype=int)
+
+
 def _limits(scene: Scene, segment: Segment, hand: Array, label: str) -> Iterator[Finding]:
     """Speed and acceleration of the fastest fingertip and turn rate of the hand, from rest to rest."""
     pusher, height = scene.pusher, _height(segment)
@@ -369,9 +387,14 @@ def _limits(scene: Scene, segment: Segment, hand: Array, label: str) -> Iterator
             np.maximum.at(value, kind, np.where(np.isnan(over), np.inf, over))
             yield Finding("fingertip speed, of the limit", *_most(value, "", 1 + SLACK, label))
             # From rest to rest; across a sample each side has its limit for its half of the time.
-            velocity = np.concatenate([np.zeros((1, 3)), velocity, np.zeros((1, 3))])
-            times = np.concatenate([[0.0], t, [0.0]])
-            most = np.concatenate([[0.0], limit[use] * t, [0.0]])
+            begin = _begins(t)
+            if not len(begin):
+                continue
+            way, most, t = (
+                np.add.reduceat(a, begin) for a in (np.diff(tips, axis=0)[use], limit[use] * t, t)
+            )
+            velocity = np.concatenate([np.zeros((1, 3)), way / t[:, None], np.zeros((1, 3))])
+            times, most = np.concatenate([[0.0], t, [0.0]]), np.concatenate([[0.0], most, [0.0]])
             change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
             allowed = 0.5 * (most[:-1] + most[1:])
             noise = (
@@ -381,6 +404,7 @@ def _limits(scene: Scene, segment: Segment, hand: Array, label: str) -> Iterator
                 / np.minimum(*(np.where(x > 0, x, np.inf) for x in (times[:-1], times[1:])))
             )
             ratio = np.maximum(change - noise, 0.0) / allowed
+            kind = kind[begin]
             value = np.zeros(len(segment.times))
             np.maximum.at(value, np.append(kind, len(dt)), np.where(np.isnan(ratio), 0.0, ratio))
             yield Finding("fingertip acceleration, of the limit", *_most(value, "", 1 + SLACK, label))

@@ -78,7 +78,7 @@ def verify(plan: Plan, scene: Scene | None = None) -> Report:
     trusted = [] if scene is None else [_difference(d) for d in scene_differences(plan.scene, scene)]
     try:
         findings = execution_findings(plan.scene, plan.segments)
-        if any(not s.arcs for s in plan.pushes):
+        if any(not s.arcs for s in plan.pushes) or (plan.segments and not plan.on_table):
             return Report((*trusted, *(_executed(finding) for finding in findings)))
         computed = certify(plan.scene, plan.segments)
     except FlatpushError as error:
