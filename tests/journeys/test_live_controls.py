@@ -134,6 +134,12 @@ def test_nothing_is_cut_off_and_every_control_has_a_name(page):
     page.js(DROP, "anywhere.yaml", (EXAMPLES / "anywhere.yaml").read_text(encoding="utf-8"))
     page.wait("document.getElementById('proved').textContent.includes('from every start')")
     page.settle()
+    page.js("flatpush.model.change((scene) => { scene.start = [-203.98, -131.25, -155.3]; })")
+    page.settle()
+    poses = (
+        "return [...document.querySelectorAll('#poses input[type=number]')]"
+        ".filter((n) => n.scrollWidth > n.clientWidth).map((n) => n.value)"
+    )
     for size in (DESK, (1000, 700), TABLET, PHONE):
         page.resize(size)
         wide, high = page.js(
@@ -141,6 +147,7 @@ def test_nothing_is_cut_off_and_every_control_has_a_name(page):
         )
         assert (wide, high) == size
         assert page.js(CUT) == []
+        assert page.js(poses) == []
         table = page.browser.find_element("id", "table").rect
         assert table["width"] * table["height"] > 0.35 * size[0] * size[1]
         boxes = page.js(

@@ -10,7 +10,7 @@ const SLIDERS = [
   ["finger spacing", "pusher.spacing", 4, 60, 0.5, "mm"],
   ["tip radius", "pusher.tip_radius", 0, 10, 0.1, "mm"],
   ["switching cost", "planning.switch_cost", 0, 100, 1, "mm"],
-  ["friction margin", "planning.margin.friction", 0, 0.9, 0.01, ""],
+  ["friction margin", "planning.margin.friction", 0, 0.9, 0.01, "of μ"],
   ["clearance", "planning.margin.clearance", 0, 20, 0.1, "mm"],
 ];
 const CHOICES = [
@@ -122,6 +122,7 @@ export class Panel {
     for (const id of STALE) find(id).classList.remove("stale");
     say(find("title"), document.title);
     say(find("subtitle"), solved ? plan.subtitle + (plan.stored ? ` · ${plan.stored}` : "") : (plan.reason || "").split("\n")[0]);
+    find("subtitle").title = find("subtitle").textContent;   /* whole, where the line is cut off */
     const spent = plan.planning_time;
     say(find("cost"), solved ? plan.cost.split(" (")[0] : "–");
     say(find("duration"), solved ? number(plan.duration, 1) + " s" : "–");
