@@ -163,6 +163,8 @@ def test_a_matrix_that_is_not_of_the_paper_s_form_breaks_the_line(monkeypatch):
         (("all", "fig3", "-o", "report"), "other experiments"),
         (("all", "--runs", "3", "-o", "report"), "--runs"),
         (("fig3", "--quick"), "--quick"),
+        (("fig3", "-o", "report"), "--figures FOLDER"),
+        (("fig3", "--figures", "no/such"), "no such folder"),
         (("all", "-o", "no/such/report"), "no such folder"),
         (("all", "-o", "report", "--data", "nowhere"), "recorded data"),
     ],

@@ -178,7 +178,10 @@ def _tell(data: dict[str, Any]) -> None:
                     f"  one finger: a small error grows e-fold every {mm * push['divergence_length']:.1f} mm"
                 )
         radii = {k: ("cannot steer" if r is None else f"{mm * r:.1f}") for k, r in push["radii"].items()}
-        typer.echo("  turning radius [mm]: " + "; ".join(f"{k} {r}" for k, r in radii.items()))
+        told = "; ".join(f"{k} {r}" for k, r in radii.items())
+        if all(r is None for r in push["radii"].values()):
+            told = "cannot steer under any assumption"
+        typer.echo(f"  turning radius [mm]: {told}")
         known = [r for k, r in push["radii"].items() if r is not None and k != MIDDLE]
         if known and max(known) > 1.5 * min(known):
             typer.echo(

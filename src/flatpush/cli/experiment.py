@@ -67,13 +67,15 @@ def command(
             "all",
         )
         return _all(output, quick, data, on_cluster, scheduler, as_json)
+    if output is not None:
+        raise InputError(f"-o is for `all`; figures of {', '.join(names)} go where --figures FOLDER says")
     _refuse(
-        {"-o": output is not None, "--quick": quick, "--cluster": on_cluster, "--scheduler": bool(scheduler)},
+        {"--quick": quick, "--cluster": on_cluster, "--scheduler": bool(scheduler)},
         ", ".join(names),
     )
     ready = [experiment(name, data, runs, seed, seeds) for name in names]
-    if figures is not None and not figures.is_dir():
-        raise InputError("the folder for figures does not exist", source=str(figures))
+    if figures is not None:
+        _folder(figures)
     tables = {}
     for name, run in zip(names, ready, strict=True):
         with telling(f"running {name}"):
@@ -90,6 +92,15 @@ def _refuse(given: dict[str, bool], names: str) -> None:
     for option, there in given.items():
         if there:
             raise InputError(f"flatpush experiment {names} does not go with {option}")
+
+
+def _folder(path: Path) -> None:
+    """Makes a folder that is not there yet."""
+    from ..documents.atomic import check_writable
+
+    if not path.is_dir():
+        check_writable(path)
+        path.mkdir()
 
 
 def _all(
@@ -115,9 +126,7 @@ def _all(
     if folder is not None and not folder.is_dir():
         raise InputError("the folder of recorded data does not exist", source=str(folder))
     if output is not None:
-        if not output.is_dir():
-            check_writable(output)
-            output.mkdir()
+        _folder(output)
         check_writable(output / REPORT)
     done: dict[str, Done] = {}
     count = os.cpu_count() or 1

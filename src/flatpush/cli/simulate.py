@@ -305,7 +305,8 @@ def _tell(found: Any) -> None:
         "turn": "turn to goal [°]",
     }
     for name, values in found.quantiles().items():
-        typer.echo(f"{words[name]:<24}" + "".join(f"{scale[name] * value:>10.3f}" for value in values))
+        numbers = (round(scale[name] * value, 3) + 0.0 for value in values)  # no -0.000
+        typer.echo(f"{words[name]:<24}" + "".join(f"{number:>10.3f}" for number in numbers))
 
 
 def _correlations(covariance: Any, deviations: Any) -> list[tuple[str, str, float]]:
