@@ -317,3 +317,19 @@ def test_what_makes_no_sense_is_refused(square):
             plant.step(state, velocity, dt)
     with pytest.raises(InputError, match="one for each of 2 runs"):
         plant.many(np.zeros((2, 3)), [[-1.1, 0, 0]], friction=[0.1, 0.2, 0.3])
+    with pytest.raises(InputError, match="threads are 1 or more"):
+        plant.many(np.zeros((2, 3)), [[-1.1, 0, 0]], threads=-1)
+
+
+@pytest.mark.parametrize("far", [1e9, 1e308])
+def test_what_is_too_far_away_for_contacts_is_refused(square, far):
+    """Where places are rounded by more than contacts are exact, a push would not end."""
+    plant, there, way = Plant(square, [[0.0, 0.0]], 0.1), [far, 0, 0], [[far - 1.2, 0, 0], [far, 0, 0]]
+    for made in (
+        lambda: plant.start(there, [0, 0, 0]),
+        lambda: plant.start([0, 0, 0], there),
+        lambda: plant.follow(there, way),
+        lambda: plant.many([there], way),
+    ):
+        with pytest.raises(InputError, match="times the object's size from the origin"):
+            made()

@@ -18,6 +18,9 @@ from .codes import AS_IT_IS, BODY, LEFT, MODES, OUTCOMES, RIGHT, STRAIGHT
 from .runner import Codes, Done, Runner, Task
 
 LONGEST = 2e4  # way of a hand in one run, by the outline's size: some ten seconds of compiled steps
+FARTHEST = (
+    1e7  # from the table's origin, by the outline's size: beyond, rounding is as large as contacts are exact
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +152,7 @@ class Plant:
         "starts inside".
         """
         hands = self._hands(hand)
-        done = self._runner.run(
-            Task(_vector(object_, 3, "a pose")[None], hands[None, None], AS_IT_IS, push_out)
-        )
+        done = self._runner.run(Task(self._pose(object_)[None], hands[None, None], AS_IT_IS, push_out))
         return self._state(done, np.ndim(hand) == 2)
 
     def step(self, state: PlantState, velocity: ArrayLike, dt: float) -> PlantState:
@@ -190,7 +191,7 @@ class Plant:
             body: whether the hand goes from pose to pose with a constant body twist instead.
         """
         hands = self._way(hand)
-        q = _vector(object_, 3, "a pose")
+        q = self._pose(object_)
         done = self._runner.run(Task(q[None], hands[None], BODY if body else STRAIGHT, push_out, len(hands)))
         status, reached = done.ends[0].tolist()
         return PlantRun(
@@ -223,11 +224,14 @@ class Plant:
             push_out, body: as in follow. record: keeps the whole way of every run.
 
         Raises:
-            InputError: for other shapes, or a negative friction.
+            InputError: for other shapes, a negative friction, or less than one thread.
         """
         objects = np.array(starts, dtype=float)
         if objects.ndim != 2 or objects.shape[1] != 3 or not np.isfinite(objects).all():
             raise InputError("starts are poses, shape (n, 3)", value=objects.shape)
+        self._refuse_too_far(objects)
+        if threads is not None and threads < 1:
+            raise InputError("threads are 1 or more", value=threads)
         n = len(objects)
         hands = np.array(hand, dtype=float)
         hands = self._way(hands)[None] if hands.ndim == 2 else self._way(hands, many=True)
@@ -260,7 +264,13 @@ class Plant:
         hands = np.atleast_2d(np.array(hand, dtype=float))
         if hands.shape not in ((1, 3), (len(self.fingers), 3)) or not np.isfinite(hands).all():
             raise InputError("a hand is one pose, or one for each finger", value=hand)
+        self._refuse_too_far(hands)
         return hands
+
+    def _pose(self, object_: ArrayLike) -> Array:
+        pose = _vector(object_, 3, "a pose")
+        self._refuse_too_far(pose)
+        return pose
 
     def _way(self, hand: ArrayLike, many: bool = False) -> Array:
         way = np.array(hand, dtype=float)
@@ -274,8 +284,17 @@ class Plant:
             raise InputError("the hand's way is poses, shape (n, 3)", value=np.shape(hand))
         if not np.isfinite(way).all():
             raise InputError("the poses of the hand are finite numbers")
+        self._refuse_too_far(way)
         self._refuse_too_long(np.sum(np.abs(np.diff(way[..., :2], axis=-3)), axis=-3))
         return np.ascontiguousarray(way)
+
+    def _refuse_too_far(self, poses: Array) -> None:
+        far = float(np.max(np.abs(poses[..., :2]), initial=0.0))
+        if far > FARTHEST * self._size:
+            raise InputError(
+                f"object and fingers are at most {FARTHEST:g} times the object's size from the origin",
+                value=far,
+            )
 
     def _refuse_too_long(self, ways: Array) -> None:
         if ways.max(initial=0.0) > LONGEST * self._size:
