@@ -284,8 +284,8 @@ class Plant:
             raise InputError("the hand's way is poses, shape (n, 3)", value=np.shape(hand))
         if not np.isfinite(way).all():
             raise InputError("the poses of the hand are finite numbers")
-        self._refuse_too_far(way)
         self._refuse_too_long(np.sum(np.abs(np.diff(way[..., :2], axis=-3)), axis=-3))
+        self._refuse_too_far(way)
         return np.ascontiguousarray(way)
 
     def _refuse_too_far(self, poses: Array) -> None:
