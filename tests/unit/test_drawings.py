@@ -377,3 +377,13 @@ def test_no_output_takes_the_place_of_what_a_scene_refers_to(
     with pytest.raises(InputError, match="an input of this command"):
         import_module(f"flatpush.cli.{command}").command(**inputs, **{output: tmp_path / target})
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_how_wide_the_line_of_a_hole_is_is_not_told(tmp_path: Path) -> None:
+    """The hole is left out whole, so that its line takes nothing from the outline."""
+    from flatpush.documents import outline_note
+
+    case = next(case for case in CASES if case["file"] == "wide_hole.svg")
+    note = outline_note(scene(tmp_path, case))
+    assert note is not None
+    assert not any("of the width" in line for line in note.lines)

@@ -84,6 +84,8 @@ def outer_contour(drawing: Drawing, source: str, choice: str = "") -> tuple[Arra
     _check_no_frame(outer, [chain for chain in closed if chain is not outer], source, choice)
     if flaw := next((curve for curve, _ in outer.parts if curve.refusal), None):
         raise InputError(f"{flaw.place}: {flaw.refusal}", source=source, hint=_REDRAW)
+    own = {curve.place for curve, _ in outer.parts}  # the width of a line matters where it is the outline's
+    left = [part for part in left if not part.reason.startswith("half of the width") or part.place in own]
     left += [LeftOut(c.place, "inside the outline (a hole)", c.points) for c in closed if c is not outer] + [
         LeftOut(c.place, "an open line", c.points) for c in opened
     ]
