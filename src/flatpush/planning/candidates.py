@@ -12,7 +12,7 @@ from ..friction import Support
 from ..geometry import Outline, OutlinePoint
 from ..geometry.pose import Array
 from ..problem import Object, Push, Scene
-from ..problem.mechanics import proved_for_set
+from ..problem.mechanics import proved_for_set, starts_anywhere
 from .options import PushOption, push_option
 
 # A stretch ends where its normal has turned this far, so that a smooth outline gets pushes from all sides.
@@ -285,6 +285,8 @@ def _proved(scene: Scene, options: list[PushOption]) -> PushOption:
     """Of a nominal scene's pushes, best first, the one that turns tightest on all tables that the scene asks for.
 
     Where the nominal table turns tightest others may not, so some places apart are proved; none turns tighter proved.
+    For a start region it is the first that is proved: a place nearer to the end of a side turns tighter, and is landed
+    on less well.
     """
     if not proved_for_set(scene) or options[0].car is None:
         return options[0]
@@ -295,7 +297,9 @@ def _proved(scene: Scene, options: list[PushOption]) -> PushOption:
         at = option.push.at.point
         if option.car is None or any(np.hypot(*(at - o.push.at.point)) < apart for o in found):
             continue
-        if len(found) == PROVED or option.car.radius >= min(radii, default=np.inf):
+        if len(found) == (1 if starts_anywhere(scene) else PROVED) or option.car.radius >= min(
+            radii, default=np.inf
+        ):
             break
         proved = push_option(scene, option.push)
         if proved.car is None:
