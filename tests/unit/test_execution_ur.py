@@ -45,9 +45,11 @@ def test_every_cycle_has_its_command_and_the_tool_follows():
     assert ended.outcome == DONE
     assert seen["fired"] < 0
     assert seen["commands"] == len(ended.cycles) >= 199
-    # The watchdog is set in the first cycle, which takes some; then there is one target in each.
-    times = np.array([cycle.time for cycle in ended.cycles])
-    assert np.allclose(np.diff(times)[10:], 0.008)
+    # The watchdog is set in the first cycle, which takes some; then there is one target in each for which this machine
+    # is not late.
+    cycles = np.diff([cycle.time for cycle in ended.cycles])[10:] / 0.008
+    assert np.allclose(cycles, np.round(cycles))
+    assert np.median(cycles) == pytest.approx(1.0)
     # The simulated arm lags by 20 ms and a cycle, at 20 mm/s and more in the middle.
     poses = np.array([cycle.state.pose for cycle in ended.cycles])
     assert np.ptp(poses[:, 0]) == pytest.approx(0.02, abs=5e-4)
