@@ -10,12 +10,12 @@ from tests.laws.test_table_sets import vertex
 
 import flatpush as fp
 from flatpush.contact import PointContact, WrenchCone, cone_twists
-from flatpush.contact.cone_twists import MISSED, OFF_CENTRE
+from flatpush.contact.cone_twists import MISSED, OFF_CENTRE, RESERVE
 from flatpush.friction import Exact, Support
 from flatpush.geometry import pose_error
 from flatpush.planning import segments
 from flatpush.problem.mechanics import surface_of
-from flatpush.simulation.claims import LEAST_RESERVE, NO_RESERVE
+from flatpush.simulation.claims import NO_RESERVE
 from flatpush.simulation.rollout import roll
 
 # Objects whose tightest turns with a fifth in reserve go about a foot, with the side to push at, by (edge, along).
@@ -75,7 +75,7 @@ def bracket(margin):
     return fp.plan(replace(scene, planning=replace(scene.planning, friction_margin=margin)))
 
 
-@pytest.mark.parametrize(("margin", "warned"), [(0.0, True), (LEAST_RESERVE, False)])
+@pytest.mark.parametrize(("margin", "warned"), [(0.0, True), (RESERVE, False)])
 def test_a_plan_without_a_reserve_is_warned_of(margin, warned):
     plan = bracket(margin)
     certificate = plan.certificate
@@ -91,7 +91,7 @@ def test_a_plan_without_a_reserve_is_warned_of(margin, warned):
 @pytest.mark.slow
 def test_the_least_reserve_that_is_not_warned_of_keeps_what_no_reserve_loses():
     assert off(bracket(0.0))[0] > 0.01
-    assert off(bracket(LEAST_RESERVE))[0] < 1e-5
+    assert off(bracket(RESERVE))[0] < 1e-5
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.2])

@@ -6,6 +6,7 @@ from functools import lru_cache, reduce
 import numpy as np
 
 from ..contact import PointContact, steering_forces
+from ..contact.cone_twists import RESERVE
 from ..errors import InputError
 from ..friction.surface import LimitSurface
 from ..geometry import compose, exp, log, relative, rotate, shift_twist, velocity_at
@@ -43,11 +44,10 @@ from .tube import tube_of
 TRUSTED_GROWTH = float(np.exp(4.0))
 
 
-# A plan for two fingers with less of the friction in reserve is told so: between its samples it may need what it lacks.
-LEAST_RESERVE = 0.02
+# A plan for two fingers that keeps less than RESERVE is told so: between its samples it may need what it lacks.
 NO_RESERVE = (
     "two fingers: next to no friction is kept in reserve, and straight between samples a robot may lose the object."
-    " Plan with margin: {friction: 0.02} at least"
+    f" Plan with margin: {{friction: {RESERVE:g}}} at least"
 )
 # What every plan with slides is told with.
 LESS_CERTAIN = (
@@ -235,7 +235,7 @@ def _warnings(scene: Scene, growth: float | None, worst: Margins) -> list[str]:
             f"one finger: a small error grows {growth:.0f}-fold on the way; land precisely or use feedback"
         )
     kept = worst.composite
-    if scene.planning.friction_margin < LEAST_RESERVE and kept is not None and kept < LEAST_RESERVE:
+    if scene.planning.friction_margin < RESERVE and kept is not None and kept < RESERVE:
         found.append(NO_RESERVE)
     if worst.composite is not None and worst.composite < 0:
         found.append(
